@@ -72,6 +72,7 @@ former: setup
 bench: setup
 	$(BIN)/python benchmarks/analysis.py
 	$(BIN)/python benchmarks/core.py
+	$(BIN)/python benchmarks/one_axis_core.py
 	$(BIN)/python benchmarks/decode.py
 	$(BIN)/python benchmarks/path.py
 	$(BIN)/python benchmarks/recorder.py

@@ -21,6 +21,7 @@ RIGS = {
                "angle-step", "slew", "force-map"),
     "amb5dof": ("bearing-model", "step", "tracking", "unbalance", "compensation", "balance", "run-up", "coast-down",
                 "sensitivity"),
+    "amb1dof": ("derivative", "estimator-compare"),
 }  # fmt: skip
 FOREIGN = {
     "examples/vertical-spindle/spindle.toml": ("step", "unbalance", "balance", "run-up", "coast-down"),
@@ -52,6 +53,7 @@ ENDS: Mapping[str, tuple[Mapping[str, Any], ...]] = {
     "coast-down": ({"deceleration_rad_s2": 24.5},),
     "tracking": ({"laws": ["PID"], "y_m": 20e-6, "z_m": 20e-6},),
     "sensitivity": ({"speeds_rad_s": (10000 * RPM,)},),
+    "derivative": ({"degree": 8}, {"degree": 6}),
 }
 """Biases, speeds and rates at both ends; choices among words are read from the plans themselves."""
 # a choice that truly touches the rings with the plan's own ellipse, as the procedure's page says: tried with a smaller one

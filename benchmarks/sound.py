@@ -56,7 +56,7 @@ def main() -> None:
 
 
 def run_missing(asked: argparse.Namespace) -> None:
-    """Every seed of both rigs through its cases, one line for each run as it ends."""
+    """Every seed of the rigs through its cases, one line for each run as it ends."""
     known = {(e["rig"], e["case"], e["seed"]) for e in read(asked.file)}
     seeds = range(asked.first, asked.first + max(asked.count, asked.choices))
     waiting = []

@@ -12,7 +12,7 @@ from procedures.derivative import fit
 from procedures.derivative.estimates import Result
 from procedures.derivative.plan import Plan
 from procedures.derivative.steps import Taken, lines_of
-from procedures.one_axis.bank import LITERAL, RULES, aligned, bank, literal
+from procedures.one_axis.bank import LITERAL, RULES, aligned, bank, literal, younger
 
 DETUNED = 3e-5  # of a line's frequency, which the controller makes by its own ticks
 SMALL_M = 1e-6  # of a line in the position: less, and nothing was injected
@@ -61,7 +61,7 @@ def of_result(result: Result, taken: Sequence[Taken], plan: Plan) -> Iterator[Fi
             t = next(t for t in taken if t.where == where)
             text = (
                 f"the velocity is not what degree {plan.degree}, spacing {plan.window_s * 1e3:g} ms and rule {plan.rule} make "
-                f"of the captured position: off by {off:.1%} of its rms ({plan.max_mismatch:.1%} allowed). {_likeness(t, plan)}"
+                f"of the captured position: off by {off:.2%} of its rms ({plan.max_mismatch:.2%} allowed). {_likeness(t, plan)}"
             )
             yield Finding("not-this-estimator", text, where, Effect.INDETERMINATE)
             break  # one cause, told once
@@ -86,22 +86,34 @@ def _likeness(t: Taken, plan: Plan) -> str:
         for n in ({round(f * spacing) for f in OTHER_SPACINGS} | {*range(spacing - NEAR, spacing + NEAR + 1)})
         - {spacing}
     }
+    tried["the younger of the two filters, (4.17) the wrong way round"] = younger(
+        plan.degree, spacing, plan.rule, t.tick_s
+    )
     off = {name: aligned(b.rows, t.y[:TRIED], t.v[:TRIED])[1] for name, b in tried.items()}
+    own = bank(plan.degree, spacing, plan.rule, t.tick_s).rows
+    off["the same, a sample late"] = aligned(own, t.y[: TRIED - 1], t.v[1:TRIED])[1]
     name = min(off, key=lambda n: off[n])
     return f"It looks like {name}." if off[name] < plan.max_mismatch else "Nor is it any other that was tried."
 
 
 def lines_clear(plan: Plan, harmonic_hz: float) -> Iterator[str]:
-    """Lines that fall together with the harmonic, or with an image by the resets, where the record is sorted by places."""
+    """Lines that fall together with what else a position has, where the record is sorted by places: the harmonic, and what
+    forces that are not linear make of both, each with its images by the resets."""
     rate = 1 / plan.window_s
-    for hz in (*plan.lines_hz,):
-        aliased = {
-            "a multiple of 1/eps": hz,
-            "half of one": hz - rate / 2,
-            "the harmonic": hz - harmonic_hz,
-            "an image of the harmonic": hz + harmonic_hz,
+    for hz in plan.lines_hz:
+        others = {
+            "a multiple of 1/eps": 0.0,
+            "the harmonic": harmonic_hz,
+            "twice the line": 2 * hz,
+            "three times the line": 3 * hz,
+            "the harmonic and two lines": harmonic_hz + 2 * hz,
+            "the harmonic less two lines": harmonic_hz - 2 * hz,
         }
-        for name, apart in aliased.items():
-            near = abs(apart - rate * round(apart / rate)) if name != "the harmonic" else abs(apart)
+        apart = {name: (other - hz, other + hz) for name, other in others.items()} | {
+            "half a multiple of 1/eps": (2 * hz,)
+        }
+        for name, each in apart.items():
+            near = min(abs(x - rate * round(x / rate)) for x in each)
             if near < min(plan.clear_hz, hz * 0.9):
-                yield f"lines_hz: found {hz:g} Hz, {near:.2g} Hz from {name}; expected {plan.clear_hz:g} Hz or more"
+                text = f"{near:.2g} Hz from {name} or its image; expected {plan.clear_hz:g} Hz or more"
+                yield f"lines_hz: found {hz:g} Hz, {text}"

@@ -16,7 +16,6 @@ from procedures.derivative.steps import OFFSET, QUIET, Taken, lines_of
 from procedures.one_axis.bank import Bank, aligned
 
 Array = npt.NDArray[np.float64]
-CLOCK = 1e-4  # of the controller's tick: a crystal, with its temperature
 
 
 @dataclass(frozen=True)
@@ -66,18 +65,13 @@ def _of_line(line: Line) -> dict[str, Estimate]:
     where, each = line.taken.where, line.found.gain
     mean, count = complex(each.mean()), len(each)
     turned = each * np.conj(mean) / abs(mean)
-    clock = Influence(
-        "clock", "rate of the controller's clock", CLOCK / math.sqrt(3), "1", "B", "rectangular",
-        source="house choice: a crystal",
-    )  # fmt: skip
-    rate = Estimate.of(1.0, clock)
     gain = _typed(abs(mean), turned.real.std(ddof=1) / math.sqrt(count), "1", f"gain/{where}", count)
     phase = _typed(
         float(np.angle(mean)), turned.imag.std(ddof=1) / math.sqrt(count) / abs(mean), "rad", f"phase/{where}", count
     )
-    out = {"gain": gain * rate, "phase": phase}
+    out = {"gain": gain, "phase": phase}
     for name, (value, u) in (("error", line.found.error), ("sideband", line.found.sideband)):
-        out[name] = _typed(value, u, "1", f"{name}/{where}", count) + (rate - 1.0) * abs(mean)
+        out[name] = _typed(value, u, "1", f"{name}/{where}", count)
     return out
 
 
@@ -145,7 +139,7 @@ def _false_derivative(taken: Sequence[Taken], asked: Bank, plan: Plan) -> dict[s
 
 def _means(x: Array, asked: Bank, plan: Plan) -> Array:
     length = len(x) // plan.blocks // asked.spacing * asked.spacing
-    return np.asarray(x[: plan.blocks * length].reshape(plan.blocks, length).mean(axis=1))
+    return np.asarray((x[: plan.blocks * length].reshape(plan.blocks, length) * fit.endless(length)).mean(axis=1))
 
 
 def _noise_gain(taken: Sequence[Taken], asked: Bank, plan: Plan, harmonic_hz: float) -> dict[str, Estimate]:

@@ -13,7 +13,7 @@ from procedures.estimator_compare.plan import Plan
 from procedures.estimator_compare.steps import ENGAGE, HANG, Taken
 from procedures.one_axis.bank import Array, aligned
 
-OVERLAPPING, FEW, MISMATCH = "overlapping", 4, 1e-3  # which is held against its weights, in so many captures
+OVERLAPPING, FEW, MISMATCH = "overlapping", 4, 1e-4  # which is held against its weights, in so many captures
 SAME = 1e-6  # of the rms of two estimators' velocities in the same repeat: they are one
 
 
@@ -66,7 +66,7 @@ def of_weights(taken: Sequence[Taken], rows: Array) -> Iterator[Finding]:
     worst = max((aligned(rows, t.y, t.v)[1] for t in mine[:FEW]), default=0.0)
     if worst > MISMATCH:
         text = (f"the velocity is not what the controller's degree, spacing and rule make of the captured position: off by "
-                f"{worst:.1%} of its rms ({MISMATCH:.1%} allowed). Look at it with `derivative`.")  # fmt: skip
+                f"{worst:.2%} of its rms ({MISMATCH:.2%} allowed). Look at it with `derivative`.")  # fmt: skip
         yield Finding("not-this-estimator", text, OVERLAPPING, Effect.INDETERMINATE)
 
 

@@ -31,30 +31,40 @@ class Result:
 
 
 def evaluate(taken: Sequence[Taken], plan: Plan, harmonic_hz: float) -> Result:
-    """Every estimate.
+    """Every estimate; `harmonic_hz` is what the controller takes for the exciter's frequency.
 
     Raises:
         AnalysisError: a switch or a load cannot be found in its capture.
     """
     values: dict[str, dict[str, Array]] = {name: {} for name in (*SWITCHED, *LOADED)}
-    for kind, names, of in ((ENGAGE, SWITCHED, plan.engaged), (HANG, LOADED, plan.loaded)):
-        for estimator in of:
-            some = of_kind(taken, kind, estimator)
-            found = np.array([_of_one(t, plan, harmonic_hz) for t in some])
-            for k, name in enumerate(names):
-                values[name][estimator] = found[:, k]
+    at = {id(t): _switched_at(t, plan) for t in taken if t.kind == ENGAGE}
+    hz = fit.exciter_hz([t.disturbance[: at[id(t)]] for t in taken if id(t) in at], harmonic_hz, taken[0].tick_s)
+    for estimator in plan.engaged:
+        found = np.array([_of_switch(t, at[id(t)], hz) for t in of_kind(taken, ENGAGE, estimator)])
+        for name, column in zip(SWITCHED, found.T, strict=True):
+            values[name][estimator] = column
+    for estimator in plan.loaded:
+        found = np.array([_of_load(t, plan) for t in of_kind(taken, HANG, estimator)])
+        for name, column in zip(LOADED, found.T, strict=True):
+            values[name][estimator] = column
     estimates = {name: {e: _mean(x, UNITS[name], f"{name}/{e}") for e, x in by.items()} for name, by in values.items()}
     return Result(values, estimates, _ratios(values, plan), tuple(taken))
 
 
-def _of_one(t: Taken, plan: Plan, harmonic_hz: float) -> tuple[float, ...]:
-    expected = round(plan.lead_s / t.tick_s)
-    if t.kind == ENGAGE:
-        at = fit.switched_at(t.current, t.y, t.v, t.disturbance, expected, t.tick_s)
-        return (fit.velocity_error(t.y, t.v, at, t.tick_s), fit.ripple(t.disturbance, at, harmonic_hz, t.tick_s),
-                fit.later(t.y, at, t.tick_s))  # fmt: skip
-    at = fit.moved_at(t.y, expected, t.tick_s)
-    return (*fit.answer(t.y, at, t.tick_s), float(t.y[:at].std()), fit.above(t.v[:at], t.tick_s))
+def _switched_at(t: Taken, plan: Plan) -> int:
+    return fit.switched_at(t.current, t.y, t.v, t.disturbance, round(plan.lead_s / t.tick_s), t.tick_s)
+
+
+def _of_switch(t: Taken, at: int, hz: float) -> tuple[float, ...]:
+    wrong = fit.besides(t.disturbance[:at], hz, t.tick_s)
+    return fit.velocity_error(t.y, t.v, at, t.tick_s), fit.rms(wrong), fit.later(t.y, at, t.tick_s)
+
+
+def _of_load(t: Taken, plan: Plan) -> tuple[float, ...]:
+    lead = round(plan.lead_s / t.tick_s)
+    at = fit.moved_at(t.y, lead, t.tick_s)
+    quiet = slice(0, min(at, lead))
+    return (*fit.answer(t.y, at, t.tick_s), float(t.y[quiet].std()), fit.above(t.v[quiet], t.tick_s))
 
 
 def _mean(x: Array, unit: str, identity: str) -> Estimate:

@@ -6,6 +6,8 @@ of +-REACH_S that ends at CUT_HZ and delays nothing. It lacks the motion above C
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
@@ -15,7 +17,8 @@ Array = npt.NDArray[np.float64]
 CUT_HZ, REACH_S = 400.0, 0.01
 OUTSTANDING = 1000.0  # times the variance without: a current that holds the disturbance
 NOISE_HZ = 100.0  # above the exciter and what the feedback does
-NEAR_S = 0.1  # of where the switch is expected
+NEAR_S = 0.1  # before where the switch is expected: none yet
+LATE_S = 0.4  # after it: what a request may take over a link that is busy
 SURE = 8.0  # standard deviations of a quiet position: moved
 EARLY_S = 5e-3  # before it is seen to move
 LATER = (
@@ -23,6 +26,7 @@ LATER = (
     0.1,
 )  # s after the switch: what the feedback left of the transient is gone, what the estimate is wrong by is not
 WHOLE_S = 1.0  # of the integral
+TURNS, TRIED = 0.05, 41  # of the exciter's frequency: how far it may be off, and how many are tried within that
 
 
 def derivative(y: Array, tick_s: float) -> Array:
@@ -51,7 +55,7 @@ def switched_at(current: Array, y: Array, v: Array, disturbance: Array, expected
     near = round(NEAR_S / tick_s)
     a, b = y / np.abs(y).max(), v / np.abs(v).max()
     design = np.column_stack([np.ones(len(y)), a, b, a * a, a * b, a**3, a * a * b])
-    sure, late = slice(0, expected - near), slice(min(expected + near, len(y) - near // 2), len(y))
+    sure, late = slice(0, expected - near), slice(min(expected + round(LATE_S / tick_s), len(y) - near // 2), len(y))
     left = current - design @ np.linalg.lstsq(design[sure], current[sure], rcond=None)[0]
     share = float((left[late] @ disturbance[late]) / (disturbance[late] @ disturbance[late]))
     more = np.cumsum(left**2 - (left - share * disturbance) ** 2)  # by how much the second fits better so far
@@ -81,16 +85,30 @@ def velocity_error(y: Array, v: Array, until: int, tick_s: float) -> float:
     return rms(v[:until][inside] - true[inside]) / rms(true[inside])
 
 
-def ripple(disturbance: Array, until: int, hz: float, tick_s: float) -> float:
-    """RMS of the estimated disturbance (n,) N less a constant and a sine near `hz`, before sample `until`: what it is wrong
-    by, as far as it is not itself constant or at that frequency."""
-    x, t = disturbance[:until], np.arange(until) * tick_s
+def exciter_hz(disturbances: Sequence[Array], near: float, tick_s: float) -> float:
+    """The exciter's frequency, within TURNS of `near` Hz, of what was estimated of the disturbance, each (n,) N.
 
-    def left(f: float) -> float:
-        design = np.column_stack([np.ones(until), np.cos(2 * np.pi * f * t), np.sin(2 * np.pi * f * t)])
-        return rms(x - design @ np.linalg.lstsq(design, x, rcond=None)[0])
+    Least squares over all of them, each with its own scatter: they have one exciter, and one of them alone would take for its
+    sine what only looks like one for its few periods. The lowest of the tried frequencies, and a parabola through it.
 
-    return min(left(f) for f in hz * np.linspace(0.99, 1.01, 9))
+    Raises:
+        AnalysisError: it is none within TURNS.
+    """
+    tried = near * np.linspace(1 - TURNS, 1 + TURNS, TRIED)
+    cost = np.array([sum(len(x) * np.log(rms(besides(x, hz, tick_s))) for x in disturbances) for hz in tried])
+    k = int(np.argmin(cost))
+    if k in (0, TRIED - 1):
+        raise AnalysisError(f"found no exciter within {TURNS:.0%} of {near:g} Hz, what the controller takes it for")
+    left, least, right = cost[k - 1 : k + 2]
+    return float(tried[k] + (tried[1] - tried[0]) * (left - right) / (2 * (left - 2 * least + right)))
+
+
+def besides(x: Array, hz: float, tick_s: float) -> Array:
+    """What a disturbance (n,) N has besides a constant and a sine: what its estimate is wrong by, as far as that is not itself
+    constant or at the exciter's frequency."""
+    t = np.arange(len(x)) * tick_s
+    design = np.column_stack([np.ones(len(x)), np.cos(2 * np.pi * hz * t), np.sin(2 * np.pi * hz * t)])
+    return np.asarray(x - design @ np.linalg.lstsq(design, x, rcond=None)[0])
 
 
 def later(y: Array, at: int, tick_s: float) -> float:

@@ -37,7 +37,12 @@ VELOCITY = Quantity(
 DISTURBANCE = Quantity(
     "disturbance_error", "N", "RMS of the estimated disturbance less a constant and a sine, before the switch"
 )
-AFTER = Quantity("y_50_100", "m", "RMS position 50 to 100 ms after the compensation was switched on")
+AFTER = Quantity(
+    "y_50_100",
+    "m",
+    "RMS position 50 to 100 ms after the compensation was switched on",
+    title="position after the switch",
+)
 PEAK = Quantity("peak", "m", "greatest deviation of the position after a load is hung")
 INTEGRAL = Quantity("integral", "m s", "integral over 1 s of the deviation's size after a load is hung")
 QUIET = Quantity("quiet", "m", "standard deviation of the position before the load")
@@ -49,7 +54,7 @@ RATIOS = tuple(
     Quantity(f"{q.name}_ratio", "1", f"ratio of two estimators' {q.name}, mean of the repeats' own") for q in SINGLES
 )
 MEASURES = (*SINGLES, *RATIOS)
-SPARE_S = 0.05  # of a capture, for the time that a request takes
+SPARE_S = 0.5  # of a capture, for the time that a request takes over a link that is busy
 
 
 def settings(rig: RigFile, plan: Plan) -> dict[str, float]:

@@ -138,6 +138,15 @@ def bank(degree: int, spacing: int, rule: Rule, tick_s: float) -> Bank:
     return Bank(rows, tick_s)
 
 
+def younger(degree: int, spacing: int, rule: Rule, tick_s: float) -> Bank:
+    """What one does whose filters take turns the wrong way round in (4.17): always the one that was just reset,
+    for which a firmware has no exact weights."""
+    rows = np.zeros((spacing, 2 * spacing))
+    for row, n in zip(rows[1:], range(1, spacing), strict=True):
+        row[2 * spacing - 1 - n :] = RULES["first-off" if rule == "first-off" else "euler"](degree, n, tick_s)
+    return Bank(rows, tick_s)
+
+
 def literal(degree: int, spacing: int, rule: Rule, tick_s: float, which: str) -> Bank:
     """What one does that has an equation as it is printed (LITERAL): a_1,(K-1) is K (K + 1) without the sign of (4.15), and
     -K (K - 1) with the + of (4.11)."""

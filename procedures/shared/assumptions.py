@@ -71,7 +71,8 @@ ESTIMATOR_COMPARE = (
 DERIVATIVE = (
     "The captured position is the one that the law took, and the velocity the one of the same tick: a tick between them turns "
     "the phase by 0.036° per Hz.",
-    "A sampling time that the controller counts wrongly changes every gain by its share; it is found from 0.1 % on.",
+    "Time is the controller's: a clock that is fast by 1e-4 changes gains and errors by that share, and the frequencies of "
+    "lines and edges by as much.",
 )
 SLEW = (
     "A controller whose reference swings by another amplitude than it was told changes the amplitude ratio by that share, and "

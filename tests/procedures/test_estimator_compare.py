@@ -12,7 +12,7 @@ import pytest
 
 from bench.cli.motion_truth import truth_of_motion
 from bench.cli.virtual import Simulated, simulated_run
-from bench.errors import AnalysisError
+from bench.errors import AnalysisError, BenchError
 from bench.findings import Effect, Finding
 from bench.procedure import Measured
 from bench.rigfile import load_rig
@@ -76,6 +76,7 @@ def test_the_truth_is_covered(tmp_path: Path) -> None:
     ("truth", "code"),
     [
         ({"factor_degree": 6 / 7}, "not-this-estimator"),
+        ({"estimate_late": 1}, "not-this-estimator"),
         pytest.param({"factor_estimator": 0.5}, "not-this-estimator", marks=pytest.mark.long),
         pytest.param({"factor_estimator": 1.5}, "not-this-estimator", marks=pytest.mark.long),
         pytest.param({"literal_weights": 1}, "not-this-estimator", marks=pytest.mark.long),
@@ -84,6 +85,42 @@ def test_the_truth_is_covered(tmp_path: Path) -> None:
 )
 def test_planted_defects_do_not_pass(tmp_path: Path, truth: dict[str, float], code: str) -> None:
     assert code in wrong(compared(tmp_path, 2, truth))
+
+
+@pytest.mark.long
+def test_filters_that_are_swapped_lose_the_body(tmp_path: Path) -> None:
+    with pytest.raises(BenchError):
+        compared(tmp_path, 2, {"filters_swapped": 1})
+
+
+@pytest.mark.long
+@pytest.mark.timeout(300)
+@pytest.mark.parametrize("seed", range(20, 32))
+def test_the_ratios_of_the_thesis_on_drawn_stands(tmp_path: Path, seed: int) -> None:
+    """B2 by 2.5 times with its interval, B3 1.65 to 1.85 and 1.5 to 2.0, on each stand."""
+    run = compared(tmp_path, seed, repeats=6)
+    found = {name: (e.value, coverage_factor(5) * e.u) for name, e in told(run).items()}
+    for name in ("velocity_error", "disturbance_error"):
+        value, wide = found[f"{name}_ratio@single / overlapping"]
+        assert value - wide > 2.5
+    for name, low, high in (("integral", 1.65, 1.85), ("peak", 1.5, 2.0)):
+        value, wide = found[f"{name}_ratio@observer / overlapping"]
+        assert low < value - wide
+        assert value + wide < high
+
+
+def test_the_exciter_is_found_among_what_the_resets_make() -> None:
+    """40.13 Hz by captures of 0.3 s that have other lines of the same size, with a constant and noise."""
+    rng, t = np.random.default_rng(3), np.arange(3000) * TICK
+    some = [
+        2 + np.sin(2 * math.pi * (40.13 * t + a)) + np.sin(2 * math.pi * (65.0 * t + b)) + 0.1 * rng.normal(size=3000)
+        for a, b in rng.uniform(size=(20, 2))
+    ]
+    hz = fit.exciter_hz(some, 40.0, TICK)
+    assert hz == pytest.approx(40.13, abs=0.03)
+    with pytest.raises(AnalysisError, match="no exciter"):
+        fit.exciter_hz(some, 43.0, TICK)
+    assert fit.rms(fit.besides(some[0], hz, TICK)) == pytest.approx(math.sqrt(0.5 + 0.01), rel=0.05)
 
 
 @pytest.mark.long

@@ -10,8 +10,9 @@ typedef struct {
     double amplifier_rate, delay;                                                     /* rad/s; samples: 0 or 1 */
     double position_gain, position_offset, position_noise, current_gain[2], current_offset[2], current_noise;
     double trip_current, lost_position, lost_time;
-    /* of the firmware: the sign factor of (4.15) left out; + for - in (4.11); its clock's share of the tick */
-    double literal_weights, literal_sign, sample_factor;
+    /* of the firmware: the sign factor of (4.15) left out; + for - in (4.11); its clock's share of the tick; the filters of (4.17)
+     * exchanged; algebraic estimates told a sample late */
+    double literal_weights, literal_sign, sample_factor, swapped, late;
 } amb1_params;
 
 typedef struct {
@@ -34,12 +35,13 @@ typedef struct {
 
 typedef struct {
     amb1_filter filter[3]; /* two that overlap, one alone */
-    double past[1024], filtered, previous, held, estimate[4]; /* velocity by each estimator */
+    double past[1024], filtered, previous, held, estimate[4], before[4]; /* velocity by each estimator, now and a sample ago */
     double reduced[3], full[5], load[2], harmonic[2];         /* observers; what the reduced and the full one tell */
     core_tones tones;
     double rest, lift_clock, injected, control;
     int64_t clock;
-    int32_t mode, fresh, warm, was_free;
+    int32_t mode, fresh, warm, was_free, degree;
+    double weight[9]; /* a_1p of that degree */
 } amb1_law_state;
 
 typedef struct {

@@ -5,12 +5,6 @@
 #include "amb1dof.h"
 #include "numbers.h"
 
-static double power(double x, int n) {
-    double out = 1;
-    while (n-- > 0) out *= x;
-    return out;
-}
-
 static double factorial(int n) { return n < 2 ? 1 : n * factorial(n - 1); }
 
 /* a_1p of (4.15) with the sign (-1)^(n - p): K!^2/(p!^2 (K - p)!), and of the last one K (K - 1), which without it is K (K + 1) */
@@ -19,19 +13,28 @@ static double weight(int degree, int p) {
     return top * top / factorial(degree - p);
 }
 
+static void weigh(amb1_law_state *l, int degree) {
+    if (l->degree == degree) return;
+    for (int p = 0; p < degree - 1; p++) l->weight[p] = weight(degree, p);
+    l->degree = degree;
+}
+
 /* one sample of one filter; the derivative, or `held` in the sample of the reset */
-static double filtered(const amb1_params *p, int degree, int rule, amb1_filter *f, double y, double held) {
+static double filtered(const amb1_params *p, const amb1_law_state *l, int rule, amb1_filter *f, double y, double held) {
+    int degree = l->degree;
     double step = TICK * p->sample_factor, t = f->elapsed * step, out = held, sign = p->literal_sign != 0 ? -1 : 1;
+    double power[10] = {1}; /* of -t */
+    for (int q = 1; q <= degree; q++) power[q] = power[q - 1] * -t;
     if (f->elapsed == 0) {
         memset(f->eta, 0, sizeof f->eta);
         f->first = y;
     }
     if (rule == FIRST_OFF) y -= f->first;
     double last = p->literal_weights != 0 ? degree * (degree + 1.0) : degree * (degree - 1.0);
-    if (f->elapsed > 0) out = -(f->eta[0] + sign * last * power(-t, degree - 1) * y) / power(-t, degree);
+    if (f->elapsed > 0) out = -(f->eta[0] + sign * last * power[degree - 1] * y) / power[degree];
     for (int j = 0; j < degree - 1; j++) { /* upwards, so that each takes the next one as it was */
         int q = degree - 2 - j;
-        f->eta[j] += step * ((j < degree - 2 ? f->eta[j + 1] : 0) + weight(degree, q) * power(-t, q) * y);
+        f->eta[j] += step * ((j < degree - 2 ? f->eta[j + 1] : 0) + l->weight[q] * power[q] * y);
     }
     f->elapsed++;
     return out;
@@ -49,7 +52,7 @@ static void alone(const amb1_params *p, const amb1_control *c, const amb1_table 
     amb1_filter *f = l->filter + 2;
     if (f->elapsed >= reset) f->elapsed = 0;
     int64_t n = f->elapsed;
-    double found = filtered(p, (int)c->degree, (int)c->rule, f, y, l->held);
+    double found = filtered(p, l, (int)c->rule, f, y, l->held);
     if (c->rule == EXACT && n >= spacing && n <= table->last && n >= table->first && l->warm >= n) found = weighted(table, l, n);
     if (n >= spacing) l->held = found; /* through the reset it stays as it was */
     l->estimate[SINGLE] = l->held;
@@ -65,14 +68,16 @@ static void overlapping(const amb1_params *p, const amb1_control *c, const amb1_
             found[k] = 0;
             continue;
         }
-        found[k] = filtered(p, (int)c->degree, (int)c->rule, l->filter + k, y, 0);
+        found[k] = filtered(p, l, (int)c->rule, l->filter + k, y, 0);
         if (c->rule == EXACT && n[k] >= spacing) found[k] = l->warm >= n[k] ? weighted(table, l, n[k]) : 0;
     }
-    l->estimate[OVERLAPPING] = found[n[1] < n[0] ? 0 : 1];
+    int older = n[1] < n[0] ? 0 : 1;
+    l->estimate[OVERLAPPING] = found[p->swapped != 0 ? 1 - older : older];
 }
 
 void amb1_estimate(const amb1_params *p, const amb1_control *c, const amb1_table *table, amb1_law_state *l, double y) {
     double keep = 1 / (1 + TWO_PI * c->filter_hz * TICK);
+    weigh(l, (int)clip(c->degree, 3, 9));
     l->past[l->clock & (PAST - 1)] = y;
     if (!l->warm) l->previous = y;
     l->filtered = keep * l->filtered + (1 - keep) * (y - l->previous) / TICK;
@@ -80,6 +85,12 @@ void amb1_estimate(const amb1_params *p, const amb1_control *c, const amb1_table
     l->estimate[DIFFERENCE] = l->filtered;
     alone(p, c, table + 1, l, y);
     overlapping(p, c, table, l, y);
+    if (p->late != 0) {
+        double now[4];
+        memcpy(now, l->estimate, sizeof now);
+        for (int k = SINGLE; k <= OVERLAPPING; k++) l->estimate[k] = l->before[k];
+        memcpy(l->before, now, sizeof now);
+    }
     l->clock++;
     if (l->warm < PAST) l->warm++;
 }

@@ -20,7 +20,8 @@ COIL_OHM = 1.0
 DEFECTS = {
     "drop_fraction": 0.0, "dead_after_s": 0.0, "fault_after_s": 0.0, "drive_fault_after_s": 0.0, "integrator_factor": 1.0,
     "position_sign": 1.0,
-    "literal_weights": 0.0, "literal_sign": 0.0, "sample_factor": 1.0, "factor_degree": 1.0, "factor_window_s": 1.0,
+    "literal_weights": 0.0, "literal_sign": 0.0, "sample_factor": 1.0, "filters_swapped": 0.0, "estimate_late": 0.0,
+    "factor_degree": 1.0, "factor_window_s": 1.0,
     "factor_single_window_s": 1.0, "factor_single_reset_s": 1.0, "factor_rule": 1.0, "factor_watched": 1.0,
     "factor_estimator": 1.0,
     "factor_compensate": 1.0, "factor_pole_slow": 1.0, "factor_pole_full": 1.0, "factor_pole_fast": 1.0, "factor_kp": 1.0,
@@ -28,7 +29,8 @@ DEFECTS = {
 }  # fmt: skip
 """Planted defects and their harmless values. Of the firmware's estimators: `literal_weights`, a_1p as (4.10) and (4.15) print
 it, without the sign (-1)^(n-p); `literal_sign`, + before the terms in y as (4.11) prints it; `sample_factor`, the sampling time
-that it counts with, as a share of the tick. `factor_*` scales what a parameter sets before it acts; `load_lost` is the share of
+that it counts with, as a share of the tick; `filters_swapped`, the two filters of (4.17) exchanged; `estimate_late`, algebraic
+estimates told and used a sample late. `factor_*` scales what a parameter sets before it acts; `load_lost` is the share of
 a hung weight that the pulley keeps."""
 
 MOTIONS = Motions(band=band, compare=compare)
@@ -66,6 +68,8 @@ def params(v: Numbers, d: Numbers) -> PlantParams:
         literal_weights=d["literal_weights"],
         literal_sign=d["literal_sign"],
         sample_factor=d["sample_factor"],
+        swapped=d["filters_swapped"],
+        late=d["estimate_late"],
     )
 
 

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 class PlantParams:
     """The plant, (4.18)-(4.19): m y'' = beta ((i_p/(gap - y))^2 - (i_n/(gap + y))^2) + load + harmonic sin(rate t + phase).
 
-    Its sensors: reading = gain * value + offset. `literal_*` and `sample_factor` are what is wrong with the firmware.
+    Its sensors: reading = gain * value + offset. `literal_*`, `sample_factor`, `swapped` and `late` are what is wrong with
+    the firmware.
     """
 
     mass: float = 0.4
@@ -35,6 +36,8 @@ class PlantParams:
     literal_weights: float = 0.0
     literal_sign: float = 0.0
     sample_factor: float = 1.0
+    swapped: float = 0.0
+    late: float = 0.0
 
 
 @dataclass(frozen=True)

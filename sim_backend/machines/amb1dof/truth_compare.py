@@ -18,7 +18,8 @@ from sim_backend.machines.amb1dof.plant import TRACE, Plant
 from sim_backend.motion import CompareAsked
 
 Array = npt.NDArray[np.float64]
-SPREAD_S = 0.12  # over which the moments lie at which a switch or a load comes: whole times between resets
+SPREAD_S = 0.6  # over which the moments lie at which a switch or a load comes: whole times of both filters' pattern
+SWITCHES, LOADS = 96, 48  # how many moments
 SWITCHED, LOADED = ("velocity_error", "disturbance_error", "y_50_100"), ("peak", "integral", "quiet", "velocity_noise")
 AT = {name: k for k, name in enumerate(TRACE)}
 
@@ -29,7 +30,7 @@ def compare(rig: RigFile, drawn: Truth, asked: CompareAsked) -> Mapping[tuple[st
     for names, of, one in ((SWITCHED, asked.engaged, _switched), (LOADED, asked.loaded, _loaded)):
         for estimator, changed in of.items():
             used = in_force(rig, drawn.machine, {**asked.settings, **changed})
-            found = np.array([one(drawn, asked, used, k) for k in range(48 if one is _switched else 24)])
+            found = np.array([one(drawn, asked, used, k) for k in range(SWITCHES if one is _switched else LOADS)])
             for name, values in zip(names, found.T, strict=True):
                 out[name, estimator] = float(values.mean())
                 logs[name, estimator] = float(np.log(values).mean())
