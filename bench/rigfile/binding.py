@@ -28,7 +28,9 @@ class Binding(Part):
 
     `telemetry`: the first message carries `sequence` and `tick`, further ones (classic CAN) the low bits of the
     sequence in `counter`. `commands`: our command to values by "Message.signal". `states`: a name in the DBC's value
-    table of channel `state` to one of MODES. `no_fault`: names in that of channel `fault` that mean none.
+    table of channel `state` to one of MODES. `no_fault`: names in that of channel `fault` that mean none. `samples`: whether a
+    sample of positions and currents is the mean of the readings of its period, or its last reading; either ends a tick before
+    the sample's time.
     """
 
     telemetry: Annotated[tuple[str, ...], Field(min_length=1)] = ("Telemetry",)
@@ -40,6 +42,7 @@ class Binding(Part):
     commands: Mapping[str, Mapping[str, int | float | str]] = {}
     states: Mapping[str, Mode] = {}
     no_fault: tuple[str, ...] = ("NONE",)
+    samples: Literal["mean", "reading"] = "mean"
 
     def command(self, name: str) -> Mapping[str, int | float | str]:
         """Values by "Message.signal" that ask for a command."""

@@ -33,14 +33,15 @@ def onset(
     ticks: int,
     lag_s: float,
     window_s: float | None = None,
+    period_s: float = 0.0,
 ) -> tuple[float, float]:
     """When the set point jumped, s on the time of the samples `t` (n,), and the jump of `current` (n,) over its noise.
 
     i = i_0 + J u(t) + c v(t), u the amplifiers' answer to a step and v the square of the time since, for the rotor that begins
     to follow; each averaged over the `ticks` readings of a sample. The start with the least misfit is taken, over `window_s`
-    from it on (by default ONSET periods).
+    from it on (by default ONSET periods: `period_s`, or that of the readings where it is not told).
     """
-    window = ONSET * ticks * tick if window_s is None else window_s
+    window = ONSET * max(ticks * tick, period_s) if window_s is None else window_s
     reads = t[:, None] - tick * np.arange(1, ticks + 1)
     near = (t > earliest - BEFORE_S) & (t < latest + window)
 

@@ -21,6 +21,7 @@ from bench.rigfile.roles import answered, resolved
 from bench.samples import TICKS
 from procedures.amb_rotor.conventions import AmbRotor, conventions
 from procedures.balance.planes import names_of
+from procedures.shared.sampled import of_telemetry
 from procedures.synchronous import mark
 from procedures.synchronous.bearings import Known
 from procedures.synchronous.dwells import ORDERS, SLOW, Dwell, orders_seen, read_dwells, telemetry_period_s
@@ -119,7 +120,7 @@ def read_telemetry(rig: RigFile, seen: Mapping[str, Array], slow: bool = False) 
     tacho = mark.tachometer_of(rig, t, answered(rig, mark.told(rig), seen))
     wide = np.array([seen[n] for n in (*machine.positions, *machine.currents)])
     orders = orders_seen((ORDERS[:1] if slow else ORDERS), float(np.nanmean(tacho.speed(t))), ticks * tick)
-    track = synchronous(t, wide, tacho, Sampling(tick, ticks, tick), orders=orders)
+    track = synchronous(t, wide, tacho, of_telemetry(rig, ticks * tick), orders=orders)
     return Read(float(track.speed[0]), np.asarray(track.means[0]), track.vectors(0, range(12)), tacho.sound,
                 higher={} if slow else _higher(track))  # fmt: skip
 

@@ -36,7 +36,7 @@ def _error(result: Result, plan: Plan, hz: Array, fine: Array) -> Figure:
         f"{plan.window_s * 1e3:g} ms, rule {plan.rule}; the curve is that of the weights.",
         "frequency (Hz)", "error (%)",
         (_points(result, "error", hz, 100.0), Series("weights", fine, 100 * result.bank.error(fine))),
-        lines=((f"{plan.limit:.1%}", 100 * plan.limit),), log_x=True, log_y=True,
+        lines=((f"limit of the band, {plan.limit:.1%}", 100 * plan.limit),), log_x=True, log_y=True,
     )  # fmt: skip
 
 

@@ -38,7 +38,7 @@ AT = Quantity("error_at", "1", "error at the plan's frequency, between the lines
 FALSE = Quantity("false_derivative", "1/s", "mean velocity per constant position")
 NOISE = Quantity("noise_gain", "1/s", "RMS of the velocity per rms of white noise in the position")
 BY_LINE, WHOLE = (GAIN, PHASE, ERROR, SIDEBAND), (LOW, HIGH, AT, FALSE, NOISE)
-MEASURES = (*BY_LINE, *WHOLE)
+MEASURES = (*WHOLE, *BY_LINE)
 MARGIN = 0.8  # of the clearance that offset and injection may use
 ESTIMATOR = "overlapping"
 
@@ -105,10 +105,10 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
 
 
 def measured(result: Result) -> Iterator[Measured]:
-    """The quantities of each line, then those of the whole."""
+    """The quantities of the whole, which a reader asks for first, then those of each line."""
+    yield from (q.measured(result.whole[q.name]) for q in WHOLE if q.name in result.whole)
     for where, found in result.by_line.items():
         yield from (q.measured(found[q.name], where) for q in BY_LINE)
-    yield from (q.measured(result.whole[q.name]) for q in WHOLE if q.name in result.whole)
 
 
 def figures(result: Result, recording: Recording[Plan]) -> Iterable[Figure]:

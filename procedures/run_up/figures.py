@@ -68,7 +68,7 @@ def _rate(p: Passage) -> float:
 
 def _segment(p: Passage) -> int:
     """Samples over which the speed changes by as much as a spectrum of them resolves."""
-    rate = 1 / (p.sampling.ticks * p.sampling.tick)
+    rate = 1 / p.period_s
     return int(2 ** round(math.log2(rate * math.sqrt(2 * math.pi / abs(_rate(p))))))
 
 

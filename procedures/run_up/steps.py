@@ -20,6 +20,7 @@ from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.rigfile.roles import STATUS
 from procedures.amb_rotor.conventions import AmbRotor, conventions
+from procedures.shared.sampled import of_telemetry
 from procedures.shared.signals import clips
 from procedures.synchronous import mark
 from procedures.synchronous.dwells import Dwell, full_rate, telemetry_channels
@@ -56,6 +57,11 @@ class Passage:
     lost: int
     expected: int
     machine: AmbRotor
+
+    @property
+    def period_s(self) -> float:
+        """From one sample to the next."""
+        return float(np.median(np.diff(self.t)))
 
     @property
     def speeds(self) -> Array:
@@ -111,7 +117,7 @@ def read_passage(recording: Recording[Any]) -> Passage:
         str(labels["direction"]),
         float(labels["acceleration_rad_s2"]),
         tacho,
-        Sampling(tick, ticks, tick),
+        of_telemetry(recording.rig, ticks * tick),
         t,
         wide,
         np.array([data[c] for c in machine.plane_voltages]).reshape(-1, t.size),
@@ -187,7 +193,7 @@ def _piece(p: Passage, angle: Array, first: int, last: int, turns: int) -> tuple
     low, high = np.searchsorted(angle[: p.moving.stop], 2 * math.pi * np.array([first, last], dtype=float))
     part = slice(max(int(low) - 1, 0), int(high) + 1)  # a sample beyond either end
     fast = float(np.nanmax(p.speeds[part]))
-    orders = (1.0, 2.0) if 2 * fast / (2 * math.pi) < 0.4 / (p.sampling.ticks * p.sampling.tick) else (1.0,)
+    orders = (1.0, 2.0) if 2 * fast / (2 * math.pi) < 0.4 / p.period_s else (1.0,)
     track = synchronous(p.t[part], p.data[:, part], p.tacho, p.sampling, orders=orders, turns=turns)
     edges = p.tacho.time(2 * math.pi * (first + turns * np.arange(track.speed.size + 1)))
     places = np.searchsorted(p.t[part], edges)
@@ -241,7 +247,7 @@ def near(p: Passage, recording: Recording[Any], speed: float, law: str) -> tuple
     half = max(float(angle[close[-1]] - angle[close[0]]) / 2, turn * (NEAR_TURNS / 2 + 0.5))
     low, high = np.searchsorted(angle[: p.moving.stop], [angle[k] - half, angle[k] + half])
     part = slice(max(int(low), p.moving.start), min(int(high), p.moving.stop))
-    orders = [n for n in (1.0, 2.0, 3.0) if n == 1 or n * speed / turn < 0.4 / (p.sampling.ticks * p.sampling.tick)]
+    orders = [n for n in (1.0, 2.0, 3.0) if n == 1 or n * speed / turn < 0.4 / p.period_s]
     track = synchronous(p.t[part], p.data[:, part], p.tacho, p.sampling, orders=orders)
     captures = recording.captures(passed_rad_s=speed)
     full = full_rate(captures[0], p.machine) if captures else None

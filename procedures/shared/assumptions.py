@@ -91,8 +91,9 @@ STEP = (
     "steady_error, 1.5 % in overshoot, and half a swing or more in settling_time.",
     "A controller that goes to its set points at a rate of its own makes ramps of them: found where the largest step rises "
     "later than the smallest by 1 % and 1.5 U of the difference; less widens a rise by as much.",
-    "A sample of telemetry is taken for the mean over its period. Where it is a reading at the period's end, overshoots come "
-    "too large: by 0.4 % of the swing where a twentieth of the swing's period passes between samples, by its square elsewhere.",
+    "A sample of telemetry is taken for the mean over its period, also where binding.samples says otherwise. Where it is a "
+    "reading at the period's end, overshoots come too large: by 0.4 % of the swing where a twentieth of the swing's period "
+    "passes between samples, by its square elsewhere.",
 )
 UNBALANCE = (
     "Runout that changes with speed (a shaft that grows, probes that see its material) is in the vectors, half axes and D_max "

@@ -22,6 +22,7 @@ from bench.rigfile import RigFile
 from bench.rigfile.roles import STATUS
 from bench.units import RPM
 from procedures.amb_rotor.conventions import AmbRotor, conventions
+from procedures.shared.sampled import of_telemetry
 from procedures.shared.signals import clips
 from procedures.synchronous import facts, mark
 
@@ -154,7 +155,7 @@ def read_dwell(recording: Recording[Any], step: Step) -> Dwell:
     data = step.read(*telemetry_channels(recording.rig))
     t = (data["t_ns"] - recording.start_ns) * 1e-9
     ticks = round(recording.streams["telemetry"].period_ns * 1e-9 / tick)
-    sampling = Sampling(tick, ticks, tick)
+    sampling = of_telemetry(recording.rig, ticks * tick)
     if len(t) < 100:
         raise AnalysisError(f"{step.kind} {dict(step.labels)}: found {len(t)} samples; expected 100 or more")
     tacho = mark.tachometer_of(recording.rig, t, data)

@@ -37,6 +37,12 @@ class Wave:
     tick: float
     ticks: int
     ratio: int = 1
+    spaced: int = 0  # ticks from one sample to the next, where a sample is a reading and no mean of them all
+
+    @property
+    def period(self) -> float:
+        """From one sample to the next, s."""
+        return self.tick * (self.spaced or self.ticks)
 
     @property
     def axes(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
@@ -144,7 +150,7 @@ def turns(path: Path, f: Facts) -> Turns:
     room = left(path.readings, f)
     stepped = path.points is not None
     both = positions(path, f) if stepped else np.concatenate([errors(path, f), plane_errors(path, f)])
-    period = path.wave.tick * path.wave.ticks
+    period = path.wave.period
     parts = np.arange(round(1 / path.wave.hz / period)) * period
     grid = np.array([path.t[m][0] for m in per])[:1] + np.arange(len(per))[:, None] / path.wave.hz + parts
     folded = np.array([np.interp(grid, path.t, row) for row in both]).transpose(1, 0, 2)

@@ -55,7 +55,9 @@ def read_points(step: Step, origin: int) -> Points | None:
     return Points(t, y, z)
 
 
-def delay(points: Points, t: Array, upper: Array, lower: Array, machine: AmbRotor, tick: float) -> tuple[float, float]:
+def delay(
+    points: Points, t: Array, upper: Array, lower: Array, machine: AmbRotor, tick: float, ticks: int, period_s: float
+) -> tuple[float, float]:
     """By how much later than it is recorded a write acts, s, and the answer's jump over its noise; from the currents of both
     sides (4, n) A at `t` (n,) s.
 
@@ -79,7 +81,7 @@ def delay(points: Points, t: Array, upper: Array, lower: Array, machine: AmbRoto
     if not at:
         raise AnalysisError("found no samples about the steps of the reference; expected some about each")
     when, what = np.concatenate(at), np.concatenate(answers)
-    return onset(when, what, 0.0, 2 * period, tick=tick, ticks=round(period / tick), lag_s=machine.lag_s)
+    return onset(when, what, 0.0, 2 * period, tick=tick, ticks=ticks, lag_s=machine.lag_s, period_s=period_s)
 
 
 def contour(y: Array, z: Array, half_y: float, half_z: float) -> Array:

@@ -269,6 +269,7 @@ procedure = Procedure(
     step_count=step_count,
     steps_on=steps_on,
     untold=lambda rig: OF_POINTS if rig.capabilities.path is not None else OF_PATH,
+    reached=("curvature/*",),  # the second order of influences that are listed themselves
     former_steps=lambda plan: lift.STEPS + 1 + len(plan.order),  # what came before an orbit was not recorded
     method=read_method(__file__),
 )

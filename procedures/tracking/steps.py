@@ -16,6 +16,7 @@ from bench.rigfile.roles import SPEED, STATUS
 from procedures.amb_rotor.conventions import AmbRotor, conventions
 from procedures.amb_rotor.geometry import Facts, left
 from procedures.amb_rotor.onset import onset, pushing
+from procedures.shared.sampled import of_telemetry
 from procedures.tracking.ellipse import Path, Wave
 from procedures.tracking.points import delay, read_points
 
@@ -72,7 +73,8 @@ def channels(machine: AmbRotor) -> tuple[str, ...]:
 def sample_reference(rig: RigFile, hz: float, y: float, z: float, period_ns: int, ratio: int = 1) -> Wave:
     """The reference, as this rig's telemetry samples it."""
     tick = rig.devices["controller"].tick_s
-    return Wave(hz, y, z, tick, round(period_ns * 1e-9 / tick), ratio)
+    ticks = of_telemetry(rig, period_ns * 1e-9).ticks
+    return Wave(hz, y, z, tick, ticks, ratio, spaced=round(period_ns * 1e-9 / tick))
 
 
 def read_orbits(recording: Recording[Any]) -> list[Orbit]:
@@ -98,7 +100,10 @@ def _read_points(recording: Recording[Any], step: Step) -> Orbit:
     if points is None:
         raise AnalysisError("found no start of the reference, and no set points of it; expected one or the other")
     orbit = _read(recording, step, None, step.start_ns, 0.0, 0.0)
-    t_0, clear = delay(points, orbit.path.t, orbit.upper, orbit.lower, orbit.machine, orbit.path.wave.tick)
+    wave = orbit.path.wave
+    t_0, clear = delay(
+        points, orbit.path.t, orbit.upper, orbit.lower, orbit.machine, wave.tick, wave.ticks, wave.period
+    )
     whole = orbit.path.t > points.t[0] + GROWING / orbit.path.wave.hz
     path = replace(orbit.path, t=orbit.path.t[whole], readings=orbit.path.readings[:, whole], points=points)
     return replace(orbit, path=path, whole=path, upper=orbit.upper[:, whole], lower=orbit.lower[:, whole],
@@ -124,7 +129,7 @@ def _start(recording: Recording[Any], start: Step, wave: Wave) -> tuple[float, f
     lag = conventions(recording.rig).lag_s
     earliest, latest = ((t - start.start_ns) * 1e-9 for t in (written[0], answered[0]))
     at = (begun["t_ns"] - start.start_ns) * 1e-9
-    return onset(at, current, earliest, latest, tick=wave.tick, ticks=wave.ticks, lag_s=lag)
+    return onset(at, current, earliest, latest, tick=wave.tick, ticks=wave.ticks, lag_s=lag, period_s=wave.period)
 
 
 def _read(recording: Recording[Any], step: Step, grown: Step | None, origin: int, t_0: float, clear: float) -> Orbit:

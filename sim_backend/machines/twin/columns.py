@@ -90,10 +90,11 @@ class Columns:
         return stop_of(self.nominal, self.geometry)
 
     def noise(self, channel: str) -> float:
-        """Of a probe's reading in one tick, m rms: as set, else 0.3 um, and so much that the means of a telemetry period have
+        """Of a probe's reading in one tick, m rms: as set, else 0.3 um, and so much that the samples of the telemetry have
         half as much again as the rig file states for the channel at least."""
         stated = self.rig.channels[channel].noise if channel in self.rig.channels else None
-        least = 1.5 * (stated or 0.0) * math.sqrt(self.nominal.period_ticks)
+        averaged = self.nominal.period_ticks if self.nominal.rig.binding.samples == "mean" else 1
+        least = 1.5 * (stated or 0.0) * math.sqrt(averaged)
         return self.nominal.set("position_noise", max(3e-7, least), channel)
 
     def runout(self, name: str, order: int) -> Two:

@@ -143,6 +143,7 @@ int64_t twin_run(const twin_params *p, const twin_control *c, twin_state *st, in
         twin_law(p, &d, c, &st->law, position, &st->next);
         watch(p, &d, st, coil);
         int limited = amplifiers(p, &d, st, to);
+        if (p->readings) twin_forget(st);
         twin_collect(&d, st, position, coil);
         if (every && st->tick % every == 0) twin_record(p, st, position, coil, trace + p->traced * kept++);
         hold(p, st, &d);

@@ -37,6 +37,7 @@ class TwinParams:
     bearings: int
     tick: float
     period: int
+    readings: int  # 1 where a sample of the telemetry is the last reading of its period
     mass: float
     inertia: float
     polar_inertia: float
@@ -129,7 +130,8 @@ def params(rig: RigFile, v: Numbers, d: Numbers) -> TwinParams:
     return TwinParams(
         control=control_of(rig), names=told_of(rig, d), radial=len(layout.radial), axial=int(layout.axial is not None),
         probes=len(layout.probes), rings=len(layout.rings), planes=len(layout.planes),
-        bearings=len(rig.bearings), tick=n.tick_s, period=n.period_ticks, free_tilt=float(free.tilts), free_radial=free.radial,
+        bearings=len(rig.bearings), tick=n.tick_s, period=n.period_ticks,
+        readings=int(rig.binding.samples == "reading"), free_tilt=float(free.tilts), free_radial=free.radial,
         coil_limit=n.current_limit, own_slew=d["own_slew"], trip_current=n.set("trip_current", 1.15 * n.current_limit),
         trip_speed=n.set("trip_speed", 1.1 * rig.envelope.max_speed_rad_s), **parts,  # type: ignore[arg-type]
     )  # fmt: skip

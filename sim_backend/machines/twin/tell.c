@@ -19,6 +19,12 @@ void twin_collect(const twin_derived *d, twin_state *st, const double *position,
     st->after += st->applied.after;
 }
 
+/* What was collected of the period until now, but for its peaks. */
+void twin_forget(twin_state *st) {
+    memset(st->sums, 0, sizeof st->sums);
+    st->inject = st->before = st->after = 0;
+}
+
 /* the mark's last edge, in whole microseconds of the device's time */
 static double edge(const core_tacho *t) { return t->pulses > 0 ? floor(t->last * 1e6) * 1e-6 : 0; }
 
@@ -31,21 +37,20 @@ static void turned(const core_tacho *t, double *all) {
 }
 
 void twin_report(const twin_params *p, const twin_derived *d, twin_state *st, double *row) {
-    double all[AT_END] = {0};
-    for (int k = 0; k < AT_PEAK; k++) all[k] = st->sums[k] / p->period;
+    double all[AT_END] = {0}, count = p->readings ? 1 : p->period;
+    for (int k = 0; k < AT_PEAK; k++) all[k] = st->sums[k] / count;
     for (int k = 0; k < d->axes; k++) {
         double *peak = all + AT_PEAK + p->bearing[k];
         *peak = most(*peak, st->peak[k]);
     }
     turned(&st->tacho, all);
-    all[AT_INJECT] = st->inject / p->period;
-    all[AT_BEFORE] = st->before / p->period;
-    all[AT_AFTER] = st->after / p->period;
+    all[AT_INJECT] = st->inject / count;
+    all[AT_BEFORE] = st->before / count;
+    all[AT_AFTER] = st->after / count;
     for (int k = 0; k < AT_NOTHING - AT_CONTACT; k++) all[AT_CONTACT + k] = st->flags >> k & 1;
     for (int k = 0; k < p->told; k++) row[k] = all[p->tell[k]];
-    memset(st->sums, 0, sizeof st->sums);
+    twin_forget(st);
     memset(st->peak, 0, sizeof st->peak);
-    st->inject = st->before = st->after = 0;
     st->flags = st->in_period = 0;
 }
 

@@ -12,7 +12,7 @@
 typedef struct {
     int32_t radial, axial, probes, rings, planes, bearings; /* how many; axial 0 or 1: without it x is held */
     double tick;
-    int32_t period, substeps; /* ticks of a telemetry period; integration steps of 100 us */
+    int32_t period, substeps, readings; /* ticks of a telemetry period; integration steps of 100 us; 1: a sample is no mean */
     /* shaft; what may move: tilts, and of y and z the directions yy, yz, zz of a projector */
     double mass, inertia, polar_inertia, gravity[3], free_tilt, free_radial[3];
     /* axes; the axial one: 1 where it pulls to positive x with its positive coil, else -1 */
@@ -108,6 +108,7 @@ void twin_sense(const twin_params *, twin_derived *, twin_state *, double *posit
 void twin_law(const twin_params *, const twin_derived *, const twin_control *, twin_law_state *, const double *position,
               twin_reference *);
 void twin_refer(const twin_params *, const twin_control *, twin_law_state *, double *r, double *v);
+void twin_forget(twin_state *);
 void twin_collect(const twin_derived *, twin_state *, const double *position, const double *coil);
 void twin_report(const twin_params *, const twin_derived *, twin_state *, double *row);
 void twin_record(const twin_params *, const twin_state *, const double *position, const double *coil, double *row);
