@@ -22,15 +22,14 @@ from bench.errors import AnalysisError
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
-FROM_S, UNTIL_S = (
-    3.5e-3,
-    0.05,
-)  # from where filters and current loops have died away; about three periods of what levitates
+FROM_S = 3.5e-3  # from where filters and current loops have died away
+UNTIL_S = 0.05  # about three periods of what levitates
 SCALE = 100.0  # 1/s, of the search
 GREATEST = 300.0  # exponent of a swing that grows: its square is still a number
 APART = (1.0, 0.2), (1.06, 0.25)  # start of the search: frequencies over the guess, damping ratios
 SLOW_HZ, FAST_HZ = 15.0, 250.0  # of what levitates: slower are integrators, faster filters
 HARD = 0.95  # of damping: no oscillation
+OF_ITS_OWN = 0.75  # of the pole that carries most: what lies farther from it is another oscillation
 FAST_S, SHORT_S = 0.2, 0.012  # time constants of an integrator that is no straight line
 LASTS = 3.0  # times its time constant that it is fitted
 LATEST_S = 1.0  # until which it is looked for
@@ -57,10 +56,15 @@ class Swing:
 
     @property
     def pole(self) -> complex:
-        """The mean of the poles that oscillate, each with its part, 1/s; nan where none does. What else was fitted (slower than
-        SLOW_HZ, faster than FAST_HZ, or hardly swinging) is an integrator or a filter."""
+        """The mean of the poles that oscillate as the one that carries most does, each with its part, 1/s; nan where none does.
+        What else was fitted (slower than SLOW_HZ, faster than FAST_HZ, or hardly swinging) is an integrator or a filter."""
         size = np.abs(self.poles) / (2 * np.pi)
         swings = (size > SLOW_HZ) & (size < FAST_HZ) & (-self.poles.real < HARD * np.abs(self.poles))
+        if not swings.any():
+            return complex(np.nan)
+        carried = np.abs(self.parts) ** 2 / np.maximum(-self.poles.real, 1 / UNTIL_S)
+        lead = self.poles[int(np.argmax(np.where(swings, carried, -1.0)))]
+        swings &= np.abs(self.poles - lead) < OF_ITS_OWN * np.abs(lead)
         whole = self.parts[swings].sum()
         return complex((self.parts * self.poles)[swings].sum() / whole) if whole else complex(np.nan)
 

@@ -21,6 +21,7 @@ ANSWER = 2  # ticks from a set point's write to the amplifiers: computed one lat
 DECIMATED_S, ROWS, ORDER = 4e-4, 60, 12  # of the identification: between samples, rows of the Hankel matrix, states
 BEGIN_S, LENGTH_S = 6e-4, 0.1  # of the record that it is made of
 SLOW_HZ, FAST_HZ, DAMPED = 15.0, 250.0, 0.95  # of the rigid modes: slower are integrators, faster filters and bending
+OF_ITS_OWN = 0.75  # of the pole that carries most: what lies farther from it is another oscillation
 SWING_S, BAND_S = 0.08, 0.25  # of the first swing; of the response that makes the bandwidth
 PHASES = 3  # of the revolution, at which steps begin: what goes with one or two a turn has no mean
 COORDINATES = "yzx"
@@ -147,8 +148,11 @@ class Small:
 
     @property
     def pole(self) -> complex:
-        """Of the oscillation as it begins: the mean of the poles, each with its part."""
-        return complex((self.parts * self.poles).sum() / self.parts.sum())
+        """Of the oscillation as it begins: the mean of the poles, each with its part, of the one that carries most, by the
+        integral of its square, and of those that are near it. What lies farther is another oscillation."""
+        lead = self.poles[int(np.argmax(np.abs(self.parts) ** 2 / -self.poles.real))]
+        near = np.abs(self.poles - lead) < OF_ITS_OWN * np.abs(lead)
+        return complex((self.parts * self.poles)[near].sum() / self.parts[near].sum())
 
     @property
     def damping(self) -> float:

@@ -28,6 +28,7 @@ from procedures.step import steps as step_steps
 from procedures.step.plan import Plan
 from procedures.step.procedure import MEASURES, check, procedure, recorded_s, step_count, waited_s
 from reports.figures import draw as draw_figure
+from sim_backend.machines import stepping
 
 SHORT = {"axes": ("y",), "sizes_m": (10e-6, 20e-6), "record_s": 0.4, "settle_s": 3.0}
 FAST = 300.0
@@ -122,6 +123,14 @@ def test_a_fast_integrator_is_fitted_beside_the_swing() -> None:
         for s in ones
     ]
     assert oscillation.swing(slow).constant == 0.0  # a straight line does while the shaft swings
+
+
+def test_oscillations_that_lie_apart_are_not_averaged() -> None:
+    """A shaft that leans, its centre of mass beyond a bearing: 146 Hz that hardly swings, and 23.7 Hz that goes on."""
+    poles, parts = np.array([-862.7 + 316.8j, -17.0 + 147.7j]), np.array([-0.11 + 0.7j, -0.48 + 0.05j])
+    for found in (oscillation.Swing(poles, parts, 1.0, 0.0, 0.0), stepping.Small(poles, parts)):
+        assert found.pole == pytest.approx(poles[1])
+        assert found.frequency == pytest.approx(23.66, abs=0.01)
 
 
 @pytest.mark.parametrize(("rises", "told"), [((2.5e-3, 2.5e-3), 0), ((2.5e-3, 2.53e-3), 0), ((2.5e-3, 2.8e-3), 1)])

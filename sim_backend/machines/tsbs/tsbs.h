@@ -129,7 +129,6 @@ void tsbs_act(const tsbs_control *, const tsbs_gains *, tsbs_law_state *, const 
 void tsbs_derive(const tsbs_params *, double step, tsbs_derived *);
 void tsbs_commutate(const tsbs_params *, tsbs_derived *, tsbs_reference *);
 void tsbs_hold(const tsbs_params *, const double *coil, const double *lever, tsbs_derived *);
-void tsbs_turn(double angle, double *c, double *s);
 void tsbs_at(tsbs_derived *, double angle, double *c, double *s);
 double tsbs_harmonics(const double *c, const double *s, const double *turn_c, const double *turn_s, double *quadrature);
 void tsbs_rates(const tsbs_params *, const tsbs_derived *, const double *s, const double *coil, const double *mixed,
