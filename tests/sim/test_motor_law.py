@@ -150,6 +150,16 @@ def test_balancing_takes_load_off_the_vertical_current(offset_x: float, hz: floa
     assert unbalance(after) < (0.01 if offset_x else 0.12)  # without a load the cut at 8 degrees is reached
 
 
+def test_balancing_begins_with_a_load_that_nobody_has_seen() -> None:
+    """A shaft at rest without noise: the direction of no load at all was no number, and gamma with it for good."""
+    plant = Plant(centred(position_noise=0.0), 1, control=ControlParams(lift_by=1.0, motor_share=1.0, balance=1.0))
+    plant.mode = READY
+    plant.run(1000)
+    plant.mode = LIFT
+    plant.run(1000)
+    assert abs(plant._s.law.gamma) <= math.radians(8.001)
+
+
 def test_the_observed_load_is_the_static_one() -> None:
     """Weight at the motor 48.55 N less nothing, and 22 N across, in the fixed frame; the circle adds 34.4 N."""
     _, _, plant = balanced(91e-6, circle_radius=0.0)

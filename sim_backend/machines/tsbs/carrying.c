@@ -92,7 +92,7 @@ void tsbs_balance(const tsbs_control *c, tsbs_law_state *l) {
     double to = c->gamma;
     if (c->balance != 0 && l->share > 0) {
         const double *f = l->observed;
-        if (l->balancing == 0) l->line = atan(f[5] / f[2]);
+        if (l->balancing == 0) l->line = f[2] != 0 ? atan(f[5] / f[2]) : PI / 2; /* nothing observed yet: weight pulls down */
         l->balancing = 1;
         l->line += remainder(atan2(l->load[1], l->load[0]) - l->line, PI);
         double past = fabs(l->line) - PI / 4, turn = l->line < 0 ? -past : past;
