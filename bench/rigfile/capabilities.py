@@ -93,7 +93,11 @@ class MotorForce(Part):
     which follow no faster than `ramp` A/s; `phase` rad by which its field is turned; `ref_along` and `ref_across`, m, where it
     holds its end; `share` of the load that it carries in the
     place of a bearing, which changes no faster than `share_slew` 1/s; `segment_limit`, A; `sine` rad at `sine_hz` on the
-    angle."""
+    angle. `phase_slew` rad/s, how fast the phase changes (0: at once), and `phase_limit` rad, how far balancing may turn it;
+    `circle` m, the radius of a circle about where it holds its end, at `circle_hz`.
+
+    Of such a motor `settings` have the kinds `sharing` (static, priority, half), `lifted_by` (bearing, motor), `torque` (held,
+    limit: all that there is until `angle.speed`), `commutation` (late, ahead) and `load_balancing` (off, on)."""
 
     along: str = ""
     across: str = ""
@@ -107,6 +111,10 @@ class MotorForce(Part):
     allocation: str = ""
     sine: str = ""
     sine_hz: str = ""
+    phase_slew: str = ""
+    phase_limit: str = ""
+    circle: str = ""
+    circle_hz: str = ""
 
 
 class Bit(Part):

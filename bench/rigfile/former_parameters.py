@@ -15,6 +15,7 @@ MOTOR = {
     "along": "i_y", "across": "i_x", "ramp": "i_ramp", "phase": "gamma",
     "ref_along": "ref_ym", "ref_across": "ref_xm", "share": "motor_share", "share_slew": "share_slew",
     "segment_limit": "segment_max", "allocation": "allocation", "sine": "sine_amplitude", "sine_hz": "sine_hz",
+    "phase_slew": "gamma_slew", "phase_limit": "gamma_max", "circle": "circle_radius", "circle_hz": "circle_hz",
 }  # fmt: skip
 ANGLE = {"slew": "angle_slew", "speed": "speed_ref", "kp": "kp_theta", "ki": "ki_theta", "kd": "kd_theta",
          "low_pass_hz": "angle_hz", "derivative_on_error": "derivative_on_error"}  # fmt: skip
@@ -29,6 +30,14 @@ COMPENSATION = {
     "literal": {"observer": 2, "compensate": 3, "integral": 0},
     "waiting": {"observer": 1, "compensate": 0, "integral": 0},
 }
+MOTOR_SETTINGS = {
+    "sharing": {"static": {"allocation": 0}, "priority": {"allocation": 1}, "half": {"allocation": 2}},
+    "lifted_by": {"bearing": {"lift_by": 0}, "motor": {"lift_by": 1}},
+    "torque": {"held": {"torque_limit_run": 0}, "limit": {"torque_limit_run": 1}},
+    "commutation": {"late": {"lag_compensation": 0}, "ahead": {"lag_compensation": 1}},
+    "load_balancing": {"off": {"balance": 0}, "on": {"balance": 1}},
+}
+"""Of a motor whose law has all of them: an older one knows no allocation 2."""
 STAND = {
     "contact": {"inboard": 4, "outboard": 8, "axial": 32},
     "current_limit": 1,
@@ -102,6 +111,8 @@ def _settings(p: Content) -> Content:
         out |= {"lift": LIFT} if "law" in p else {}
     if {"k1", "k2_ccs", "k2_cac"} <= p.keys():
         out["poles"] = POLES
+    if {"allocation", "lift_by", "torque_limit_run", "lag_compensation", "balance"} <= p.keys():
+        out |= MOTOR_SETTINGS
     return out
 
 

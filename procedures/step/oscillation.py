@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
-FROM_S = 3.5e-3  # filters and current loops have died away
+FROM_S = 3.5e-3  # from where filters and current loops have died away
 UNTIL_S = 0.05  # about three periods of what levitates
 SLOW_HZ, FAST_HZ = 15.0, 250.0  # of what levitates: slower are integrators, faster filters
 HARD = 0.95  # of damping: no oscillation

@@ -81,7 +81,8 @@ class States:
 
     def _lifting(self, rows: core.Array) -> None:
         plant = self._plant
-        still = bool((np.abs(rows[:, self._machine.radial]) < SETTLED_M).all()) and plant.moved
+        lifted = getattr(plant, "lifted", None) or self._machine.radial  # a plant may lift one end alone
+        still = bool((np.abs(rows[:, lifted]) < SETTLED_M).all()) and plant.moved
         self._steady = self._steady + len(rows) if still else 0
         if self._steady * plant.period_ticks * plant.tick_s >= SETTLED_S:
             plant.mode = core.LEVITATE

@@ -33,6 +33,8 @@ enum { TRIP_LOST = 1, TRIP_CURRENT = 2, TRIP_SPEED = 4 };
 #define TICK 1e-4
 #define PERIOD 10
 
+/* cosines and sines of n angle, n = 1..4 */
+void tsbs_turn(double angle, double *c, double *s);
 void core_noise_seed(core_noise *, uint64_t seed, uint64_t stream);
 double core_normal(core_noise *);
 void core_draws(core_noise *, double *out, int count);

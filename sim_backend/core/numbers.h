@@ -3,6 +3,7 @@
 #define NUMBERS_H
 
 #define TWO_PI 6.283185307179586
+#define PI 3.141592653589793
 #define INLINE inline __attribute__((always_inline))
 
 static INLINE double least(double a, double b) { return a < b ? a : b; }

@@ -135,7 +135,7 @@ def test_oscillations_that_lie_apart_are_not_averaged() -> None:
 
 def test_a_tilt_says_what_the_second_oscillation_has_of_the_position() -> None:
     """Envelopes by the matrix exponential; the second pole has a tenth of the position. By another weight of the tilt the mean
-    pole is off, and that is what is told of it."""
+    pole is off, and that is what is told of it. Two integrators that are almost alike leave 0.3 % of the step in the tilt."""
     from scipy.linalg import expm
 
     rng = np.random.default_rng(5)
@@ -152,6 +152,7 @@ def test_a_tilt_says_what_the_second_oscillation_has_of_the_position() -> None:
     whole = states.real[1:].reshape(-1)[: (len(states) - 1) // 40 * 80].reshape(-1, 40, 2).mean(axis=1).T
     means[:, 21 : 21 + whole.shape[1]] = whole
     means[0] += np.where(t > 0, 1.0 + 0.25 * np.exp(-np.maximum(t, 0) / 0.057), 0.0)
+    means[1] += np.where(t > 0, 0.16 * (np.exp(-np.maximum(t, 0) / 0.0585) - np.exp(-np.maximum(t, 0) / 0.0555)), 0.0)
     ones = [oscillation.One(t, means + 2e-4 * rng.normal(size=means.shape)) for _ in range(16)]
     true = p + weighs * leans * states[0, 1] / states[0, 0]
     found = fit.swing(ones, tilting=coupled.Tilting(math.log(weighs), 0.2))
@@ -161,22 +162,6 @@ def test_a_tilt_says_what_the_second_oscillation_has_of_the_position() -> None:
     wrong = fit.swing(ones, tilting=coupled.Tilting(math.log(3 * weighs), 0.05))
     assert abs(wrong.pole - true) > 3 * abs(found.pole - true)
     assert 0 < doubts < 0.03 * abs(true)
-
-
-@pytest.mark.parametrize(("rises", "told"), [((2.5e-3, 2.5e-3), 0), ((2.5e-3, 2.53e-3), 0), ((2.5e-3, 2.8e-3), 1)])
-def test_rises_that_go_with_the_size_are_ramps(rises: tuple[float, float], told: int) -> None:
-    noise = Influence(id="n", name="n", u=5e-6, unit="s", kind="A", distribution="normal")
-    results = {}
-    for size, rise in zip((10e-6, 20e-6), rises, strict=True):
-        for way in (1, -1):
-            case = step_steps.Case("A", 0.0, "y", size, way)
-            settled = settling.Settling(0.0, 0.02, np.zeros(0))
-            results[case] = estimates.Result(case, (), None, settled, 0.0, {"rise_time": Estimate.of(rise, noise)})
-    found = list(slewing.of_sizes(results))
-    assert len(found) == told
-    if told:  # 20 µm in T: rise² has grown by 0.6 T² less that of 10 µm, a quarter of it
-        rate = 20e-6 * math.sqrt(0.75 * 0.6 / (rises[1] ** 2 - rises[0] ** 2))
-        assert f"some {rate * 1e3:.2g} mm/s" in found[0].text
 
 
 def test_a7_the_estimate_settles_and_integral_action_does_not(tmp_path: Path) -> None:

@@ -48,6 +48,10 @@ void tsbs_sense(const tsbs_params *p, tsbs_derived *d, tsbs_state *st, tsbs_read
                                      : angle;
 }
 
+static double size(const tsbs_reference *r, int k) {
+    return r->across[k] != 0 ? sqrt(r->segment[k] * r->segment[k] + r->across[k] * r->across[k]) : fabs(r->segment[k]);
+}
+
 static void amplifiers(const tsbs_params *p, const tsbs_derived *d, tsbs_state *st, double *coil, double *segment) {
     double now = st->tick * TICK;
     int enabled = st->law.mode != OFF;
@@ -61,10 +65,12 @@ static void amplifiers(const tsbs_params *p, const tsbs_derived *d, tsbs_state *
     }
     double per_scale = 1 / (1 + p->segment_scale_drift * now);
     for (int k = 0; k < 4; k++) {
-        double ref = least(most(st->applied.segment[k], -p->segment_limit), p->segment_limit);
-        double to = enabled ? (ref - p->segment_offset[k] - p->segment_drift[k] * now) * d->per_sense[k] * per_scale : 0;
-        segment[k] = to * st->applied.turn_c;
-        segment[k + 4] = to * st->applied.turn_s;
+        const tsbs_reference *r = &st->applied;
+        double whole = size(r, k), part = whole > p->segment_limit ? p->segment_limit / whole : 1;
+        double error = p->segment_offset[k] + p->segment_drift[k] * now, per = enabled ? d->per_sense[k] * per_scale : 0;
+        double along = (r->segment[k] * part - error) * per, across = r->across[k] * part * per;
+        segment[k] = along * r->turn_c - across * r->turn_s;
+        segment[k + 4] = along * r->turn_s + across * r->turn_c;
     }
 }
 
@@ -72,8 +78,10 @@ static void approach(const double *from, const double *to, int n, double keep, d
     for (int k = 0; k < n; k++) out[k] = to[k] + (from[k] - to[k]) * keep;
 }
 
-static void step(const tsbs_params *p, const tsbs_derived *d, tsbs_state *st, const double *coil_to, const double *segment_to, double h) {
-    double c1[10], c2[10], g0[8], g1[8], g2[8], to[8], k1[14], k2[14], k3[14], k4[14], at[14];
+/* `mixed`: what acts of the segments, which goes to `mixed_to` by their one rate */
+static void step(const tsbs_params *p, const tsbs_derived *d, tsbs_state *st, const double *coil_to, double *mixed,
+                 const double *mixed_to, double h) {
+    double c1[10], c2[10], g1[8], g2[8], k1[14], k2[14], k3[14], k4[14], at[14];
     double w0 = st->weight, w1 = w0, w2 = w0;
     if (st->weight_rate > 0) {
         double left = st->weight_to - w0, step = st->weight_rate * h;
@@ -83,12 +91,10 @@ static void step(const tsbs_params *p, const tsbs_derived *d, tsbs_state *st, co
     double half = d->coil_keep, seg = d->segment_keep;
     approach(st->coil, coil_to, 10, half, c1);
     approach(c1, coil_to, 10, half, c2);
-    tsbs_mix(p, st->segment, g0); /* one rate for all segments: what acts of them goes by it too */
-    tsbs_mix(p, segment_to, to);
-    approach(g0, to, 8, seg, g1);
-    approach(g1, to, 8, seg, g2);
+    approach(mixed, mixed_to, 8, seg, g1);
+    approach(g1, mixed_to, 8, seg, g2);
     double *s = st->s, m = st->hung_mass;
-    tsbs_rates(p, d, s, st->coil, g0, st->play, m, w0, k1);
+    tsbs_rates(p, d, s, st->coil, mixed, st->play, m, w0, k1);
     for (int k = 0; k < 14; k++) at[k] = s[k] + h / 2 * k1[k];
     tsbs_rates(p, d, at, c1, g1, st->play, m, w1, k2);
     for (int k = 0; k < 14; k++) at[k] = s[k] + h / 2 * k2[k];
@@ -97,7 +103,7 @@ static void step(const tsbs_params *p, const tsbs_derived *d, tsbs_state *st, co
     tsbs_rates(p, d, at, c2, g2, st->play, m, w2, k4);
     for (int k = 0; k < 14; k++) s[k] += h / 6 * (k1[k] + 2 * k2[k] + 2 * k3[k] + k4[k]);
     memcpy(st->coil, c2, sizeof c2);
-    approach(st->segment, segment_to, 8, seg * seg, st->segment);
+    memcpy(mixed, g2, sizeof g2);
     st->weight = w2;
 }
 
@@ -137,23 +143,25 @@ static void hold(const tsbs_params *p, tsbs_state *st, tsbs_derived *d) {
     }
 }
 
-static void watch(const tsbs_params *p, tsbs_state *st, const double *coil, double speed) {
-    int trips = 0, lost = 0;
+/* An end that the motor is to lift is no end that was lost as long as it has not left its ring. */
+static void watch(const tsbs_params *p, const tsbs_control *c, tsbs_state *st, const double *coil, double speed) {
+    int trips = 0, lost = 0, held = st->law.mode == LEVITATE;
     for (int b = 0; b < 2; b++) {
         double x = plane(st->s, p->z_sensor[b], 0) - p->ring_x[b], y = plane(st->s, p->z_sensor[b], 1) - p->ring_y[b];
         double square = x * x + y * y;
         if (square > p->clearance * p->clearance) st->flags |= b ? CONTACT_O : CONTACT_I;
-        lost |= square > p->lost_radius * p->lost_radius;
+        if (b) st->freed = held && (st->freed || 4 * square < p->clearance * p->clearance);
+        if (!b || c->lift_by == 0 || st->freed) lost |= square > p->lost_radius * p->lost_radius;
     }
     /* a rotor that bounces between the rings is lost too: a tick outside counts two, a tick inside takes one back */
-    st->lost_ticks = st->law.mode != LEVITATE ? 0 : lost ? st->lost_ticks + 2 : st->lost_ticks > 0 ? st->lost_ticks - 1 : 0;
+    st->lost_ticks = !held ? 0 : lost ? st->lost_ticks + 2 : st->lost_ticks > 0 ? st->lost_ticks - 1 : 0;
     if (st->lost_ticks * TICK > 2 * p->lost_time) trips |= TRIP_LOST;
     for (int k = 0; k < 10; k++) {
         if (fabs(coil[k]) > p->trip_current) trips |= TRIP_CURRENT;
         if (st->applied.coil[k] >= p->coil_limit[k]) st->flags |= SATURATED;
     }
     for (int k = 0; k < 4; k++)
-        if (fabs(st->applied.segment[k]) > p->segment_limit) st->flags |= SEGMENT_SATURATED;
+        if (size(&st->applied, k) > p->segment_limit) st->flags |= SEGMENT_SATURATED;
     if (fabs(speed) > p->trip_speed) trips |= TRIP_SPEED;
     if (trips && !st->trips) {
         st->trip_tick = st->tick;
@@ -197,7 +205,7 @@ int64_t tsbs_run(const tsbs_params *p, const tsbs_control *c, tsbs_state *st, in
         tsbs_commutate(p, &d, &st->next);
         st->speed = d.speed_keep * st->speed + (1 - d.speed_keep) * (r.angle - st->angle_before) / TICK;
         st->angle_before = r.angle;
-        watch(p, st, coil, st->speed);
+        watch(p, c, st, coil, st->speed);
         for (int k = 0; k < 5; k++) st->sums[k] += r.position[k];
         st->sums[5] = r.angle;
         st->sums[6] += st->speed;
@@ -207,7 +215,11 @@ int64_t tsbs_run(const tsbs_params *p, const tsbs_control *c, tsbs_state *st, in
         hysteresis(p, st);
         drive(st, &d);
         hold(p, st, &d);
-        for (int k = 0; k < st->substeps; k++) step(p, &d, st, coil_to, segment_to, TICK / st->substeps);
+        double mixed[8], mixed_to[8];
+        tsbs_mix(p, st->segment, mixed);
+        tsbs_mix(p, segment_to, mixed_to);
+        for (int k = 0; k < st->substeps; k++) step(p, &d, st, coil_to, mixed, mixed_to, TICK / st->substeps);
+        approach(st->segment, segment_to, 8, d.segment_tick, st->segment);
         st->tick++;
         done++;
         if (++st->in_period == PERIOD) {

@@ -143,6 +143,7 @@ void tsbs_derive(const tsbs_params *p, double step, tsbs_derived *d) {
     d->unbalance_s = sin(p->eccentricity_phase);
     d->coil_keep = exp(-p->amplifier_rate * step / 2);
     d->segment_keep = exp(-p->segment_rate * step / 2);
+    d->segment_tick = exp(-p->segment_rate * TICK);
     d->speed_keep = exp(-6.283185307179586 * 20 * TICK);
     d->drive_gain = d->drive_limit = d->drive_speed = 0;
     d->pole_pairs = p->pole_pairs;

@@ -47,8 +47,14 @@ class Plant(CorePlant):
         state.substeps = substeps
         self._s: Any = state
         fill(self._p, vars(self.params))
-        fill(self._c, vars(control or ControlParams()))
+        fill(self._c, vars(control or ControlParams()) | {"pole_pairs": self.params.pole_pairs})
         _lib.tsbs_start(self._p, self._c, self._s, seed & (2**64 - 1))
+
+    @property
+    def lifted(self) -> slice | None:
+        """Columns that a lift brings to rest, if not all radial ones. An end that the motor lifts may stay on its ring; the
+        shaft is then inclined, and of the inboard sensors, which are beside the bearing, only the horizontal one reads 0."""
+        return slice(0, 1) if self._c.lift_by else None
 
     @property
     def speed(self) -> float:

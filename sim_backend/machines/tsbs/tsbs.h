@@ -46,7 +46,12 @@ typedef struct {
     double motor_share, share_slew, kp_m, kd_m, ki_m, ref_xm, ref_ym, allocation, segment_max;
     double derivative_on_error, sine_amplitude, sine_hz;
     /* 1: commutation ahead by the speed times segment_lag s, the time by which the segment currents are late */
-    double lag_compensation, segment_lag;
+    double lag_compensation, segment_lag, pole_pairs;
+    /* 1: the motor lifts its end by itself, the outboard AMB stays off; how fast gamma changes (0: at once); 1: torque at its
+     * limit until speed_ref; a circle about the motor's set point */
+    double lift_by, gamma_slew, torque_limit_run, circle_radius, circle_hz;
+    /* 1: T (6.29) with gamma by (6.36), (6.37); what the controller knows of the motor, referred to the outboard sensors */
+    double balance, gamma_max, kp_b, kd_b, observer_pole, model_alpha_d, model_alpha_c, model_stiffness, model_mass;
     /* the controller's own idea of the planes: plane = share * outboard reading + (1 - share) * inboard reading */
     double share_i, share_o;
 } tsbs_control;
@@ -55,7 +60,10 @@ typedef struct {
     double integral[5], filtered[5], previous[5], rest[5];
     double angle_target, speed_target, angle_integral, angle_filtered, angle_previous, i_x, i_y;
     double goal_filtered, goal_previous, sine_phase, share, motor_integral[2], motor_filtered[2], motor_previous[2];
-    double lift_clock, turns;
+    double lift_clock, turns, up;
+    double gamma, field_gamma, field_c, field_s, motor_rest[2], circle, circle_phase;
+    double observed[6], acted[2], load[2], line, balancing; /* of each axis position, velocity, constant load */
+    double told[6];                                         /* i_x, i_y, torque current asked for and given, its bound, lambda */
     int32_t mode, fresh;
 } tsbs_law_state;
 
@@ -64,8 +72,8 @@ typedef struct {
 } tsbs_reading;
 
 typedef struct {
-    double coil[10], segment[4], gamma, ahead;  /* segments along the field, which gamma and `ahead` rad turn */
-    double turn_c, turn_s;                      /* from there to the stator */
+    double coil[10], segment[4], across[4], gamma, ahead; /* segments along and across the field, which gamma and `ahead` turn */
+    double turn_c, turn_s;                                /* from there to the stator */
 } tsbs_reference;
 
 typedef struct {
@@ -83,7 +91,7 @@ typedef struct {
     core_noise noise;
     double speed, angle_before, sums[24];
     int64_t tick, trip_tick;
-    int32_t trips, lost_ticks, flags, in_period, substeps;
+    int32_t trips, lost_ticks, flags, in_period, substeps, freed;
 } tsbs_state;
 
 void tsbs_start(const tsbs_params *, const tsbs_control *, tsbs_state *, uint64_t seed);
@@ -101,7 +109,7 @@ enum { SEGMENT_SATURATED = 2 };
 typedef struct {
     double runout_c[8], runout_s[8], target_c[8], target_s[8], tilt_c, tilt_s, motor_c, motor_s;
     double per_position_lsb, per_current_lsb, per_gain[10], per_sense[4], per_mass, per_inertia, per_coulomb_speed;
-    double angle, turn_c, turn_s, detent_c, detent_s, unbalance_c, unbalance_s, coil_keep, segment_keep, speed_keep;
+    double angle, turn_c, turn_s, detent_c, detent_s, unbalance_c, unbalance_s, coil_keep, segment_keep, segment_tick, speed_keep;
     int near; /* a ring may be touched within this tick */
     /* radial axes in the order xi, yi, xo, yo, so that one loop, and with it one vector, does all four: force constant,
      * gap, plane, magnetic offset, runout of the journal as cubics about `angle` */
@@ -121,7 +129,6 @@ void tsbs_act(const tsbs_control *, const tsbs_gains *, tsbs_law_state *, const 
 void tsbs_derive(const tsbs_params *, double step, tsbs_derived *);
 void tsbs_commutate(const tsbs_params *, tsbs_derived *, tsbs_reference *);
 void tsbs_hold(const tsbs_params *, const double *coil, const double *lever, tsbs_derived *);
-void tsbs_turn(double angle, double *c, double *s);
 void tsbs_at(tsbs_derived *, double angle, double *c, double *s);
 double tsbs_harmonics(const double *c, const double *s, const double *turn_c, const double *turn_s, double *quadrature);
 void tsbs_rates(const tsbs_params *, const tsbs_derived *, const double *s, const double *coil, const double *mixed,
