@@ -133,6 +133,22 @@ def test_oscillations_that_lie_apart_are_not_averaged() -> None:
         assert found.frequency == pytest.approx(23.66, abs=0.01)
 
 
+@pytest.mark.parametrize(("rises", "told"), [((2.5e-3, 2.5e-3), 0), ((2.5e-3, 2.53e-3), 0), ((2.5e-3, 2.8e-3), 1)])
+def test_rises_that_go_with_the_size_are_ramps(rises: tuple[float, float], told: int) -> None:
+    noise = Influence(id="n", name="n", u=5e-6, unit="s", kind="A", distribution="normal")
+    results = {}
+    for size, rise in zip((10e-6, 20e-6), rises, strict=True):
+        for way in (1, -1):
+            case = step_steps.Case("A", 0.0, "y", size, way)
+            settled = settling.Settling(0.0, 0.02, np.zeros(0))
+            results[case] = estimates.Result(case, (), None, settled, 0.0, {"rise_time": Estimate.of(rise, noise)})
+    found = list(slewing.of_sizes(results))
+    assert len(found) == told
+    if told:  # 20 µm in T: rise² has grown by 0.6 T² less that of 10 µm, a quarter of it
+        rate = 20e-6 * math.sqrt(0.75 * 0.6 / (rises[1] ** 2 - rises[0] ** 2))
+        assert f"some {rate * 1e3:.2g} mm/s" in found[0].text
+
+
 def test_a_tilt_says_what_the_second_oscillation_has_of_the_position() -> None:
     """Envelopes by the matrix exponential; the second pole has a tenth of the position. By another weight of the tilt the mean
     pole is off, and that is what is told of it. Two integrators that are almost alike leave 0.3 % of the step in the tilt."""
