@@ -17,8 +17,10 @@ from procedures.amb_rotor import loops
 from procedures.shared.certificates import certified
 from procedures.step import response, settling
 from procedures.step import steps as step_steps
-from procedures.step.oscillation import TOGETHER, One, Swing, swing
-from procedures.step.position import shares
+from procedures.step.coupled import Tilting
+from procedures.step.fit import swing
+from procedures.step.oscillation import One, Swing
+from procedures.step.position import shares, tilting_of
 from procedures.step.scatter import jackknifed, left_out, pooled, repeated, weighed
 from procedures.step.settling import Curve, Settling
 from procedures.step.steps import Case, Done
@@ -57,16 +59,16 @@ def by_case(steps: list[Done], rig: RigFile, band: float) -> dict[Case, Result]:
     Raises:
         AnalysisError: a step does not get to nine tenths of its size.
     """
-    done = step_steps.by_case(steps)
+    done, tilting = step_steps.by_case(steps), tilting_of(rig)
     ones = {case: tuple(_one(d) for d in d_all) for case, d_all in done.items()}
-    fits = {case: _fits(o) for case, o in ones.items()}
+    fits = {case: _fits(o, tilting) for case, o in ones.items()}
     seen = {
         "rise_time": repeated("s", 1, ones, _rise),
         "steady_error": repeated("m", 0, ones, lambda case, o: case.way * case.size * (_late(o) - 1)),
         "overshoot": jackknifed("1", fits, ones, lambda s, _: s.peak - 1),
         "bandwidth": jackknifed("Hz", fits, ones, lambda s, o: response.bandwidth(o, s)),
     }
-    curves = {group: _curve(of) for group, of in step_steps.by_group(steps).items()}
+    curves = {group: _curve(of, tilting) for group, of in step_steps.by_group(steps).items()}
     out = {}
     for case, all_of in done.items():
         settled = settling.settling(curves[case.group], case, all_of, band)
@@ -118,18 +120,18 @@ def _late(o: One) -> float:
     return float(o.both[0, o.t > o.t[-1] - min(TAIL_S, 0.25 * o.t[-1])].mean())
 
 
-def _fits(ones: Sequence[One]) -> list[Swing]:
+def _fits(ones: Sequence[One], tilting: Tilting) -> list[Swing]:
     """Of all steps of a case, then without each in turn; nothing where one does not fit."""
     try:
-        whole = swing(ones)
-        return [whole, *(swing([o for j, o in enumerate(ones) if j != k], whole) for k in range(len(ones)))]
+        whole = swing(ones, tilting=tilting)
+        return [whole, *(swing([o for j, o in enumerate(ones) if j != k], whole, tilting) for k in range(len(ones)))]
     except AnalysisError:
         return []
 
 
-def _curve(done: Sequence[Done]) -> Curve:
+def _curve(done: Sequence[Done], tilting: Tilting) -> Curve:
     try:
-        found = swing([_one(d) for d in done])
+        found = swing([_one(d) for d in done], tilting=tilting)
     except AnalysisError:
         return settling.fit(done, np.zeros(0, complex))
     return settling.fit(done, found.poles, found.pole, found.constant)
@@ -178,13 +180,12 @@ def _oscillation(group: str, results: Sequence[Result], rig: RigFile) -> dict[st
     """Damping and natural frequency from all steps together, those of large ones weighing more; uncertainty by leaving out
     one step after the other, among those of its kind. Nothing where there is no oscillation.
 
-    Where one oscillation stands for two beside what fades fast, the mean pole p may be off by TOGETHER |p| in any direction,
-    1/sqrt(2) of that in frequency (d|p|) and in damping ratio (sqrt(1 - zeta^2) d|p|/|p|)."""
-    ones = [o for r in results for o in r.ones]
+    What is taken for granted of a second oscillation beside what fades fast moves both (`coupled`)."""
+    ones, tilting = [o for r in results for o in r.ones], tilting_of(rig)
     kinds, n = [(r.case, o.begin) for r in results for o in r.ones], len(ones)
     try:
-        whole = swing(ones)
-        left = [swing(ones[:k] + ones[k + 1 :], whole) for k in range(n)]
+        whole = swing(ones, tilting=tilting)
+        left = [swing(ones[:k] + ones[k + 1 :], whole, tilting) for k in range(n)]
     except AnalysisError:
         return {}
     first, lag = _first_order(results), lag_estimate(rig)
@@ -212,11 +213,8 @@ def _oscillation(group: str, results: Sequence[Result], rig: RigFile) -> dict[st
         out[name] = Estimate.of(value * (1 - (low + high) / 2 * first**2), jackknife)
         out[name] += bound(f"start/{name}/{group}", "start of the step", moved, unit)
         out[name] += bound(f"size/{name}/{group}", "size of the steps", (high - low) / 2 * first**2 * value, unit)
-        if whole.constant and len(whole.poles) == 1:
-            half = TOGETHER / math.sqrt(2) * (value if name != "damping" else math.sqrt(1 - value**2))
-            out[name] += bound(
-                f"second/{name}/{group}", "second oscillation, which is not told from the first", half, unit
-            )
+        if whole.doubts:
+            out[name] += doubted(f"second/{name}/{group}", [of(s) - value for s in whole.doubts], unit)
         if lag is not None:
             slope = (of(whole.later(-START_S)) - of(whole.later(START_S))) / (2 * START_S)
             out[name] += replace(lag * slope, unit=unit)
@@ -246,6 +244,15 @@ def bound(identity: str, name: str, half: float, unit: str) -> Estimate:
     """Zero, within a half width."""
     influence = Influence(
         id=identity, name=name, u=half / math.sqrt(3), unit=unit, kind="B", distribution="rectangular"
+    )
+    return Estimate.of(0.0, influence)
+
+
+def doubted(identity: str, moved: Sequence[float], unit: str) -> Estimate:
+    """Zero, with what a result moves by where each thing taken for granted of the second oscillation is off by its standard
+    uncertainty."""
+    influence = Influence(
+        id=identity, name="second oscillation", u=math.hypot(*moved), unit=unit, kind="B", distribution="normal"
     )
     return Estimate.of(0.0, influence)
 

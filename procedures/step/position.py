@@ -18,12 +18,15 @@ import numpy.typing as npt
 from bench.rigfile import RigFile
 from bench.rigfile.places import CENTRE, Places
 from bench.rigfile.supports import once_per_rig, radial_supports
+from bench.rigfile.toleranced import Toleranced
 from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.stations import COORDINATES
+from procedures.step.coupled import ANY, Tilting
 
 Array = npt.NDArray[np.float64]
 SQUARE = math.sin(math.radians(1.0))  # of a cosine: axes that are so near to right angles are meant to be
 ALIKE = 1e-6  # of a cosine
+FIRM = 0.1  # of the logarithm of what a tilt weighs: what is stated of a shaft, and two equations of it
 
 
 def made_of(data: Mapping[str, npt.NDArray[Any]], shares: Mapping[str, float], count: int) -> Array:
@@ -101,3 +104,18 @@ def _coordinates(rig: RigFile) -> dict[str, Array]:
 
 def _by_rows(rig: RigFile, shares: Array) -> dict[str, float]:
     return dict(zip(conventions(rig).stations.channels, map(float, shares), strict=True))
+
+
+def tilting_of(rig: RigFile) -> Tilting:
+    """How much a tilt weighs beside a displacement, by what the rig file says of the shaft: J/(m a b) where the control goes by
+    probes at +-a, J/(m b²) where the magnets do (half the distances of the planes); they differ by a/b, which is not told."""
+    stations, shaft = conventions(rig).stations, rig.shaft
+    near_far = [[p.arm.value for p in of.values()] for of in (stations.probes, stations.axes)]
+    mass, inertia = (None, None) if shaft is None else (shaft.mass, shaft.transverse_inertia)
+    if not (isinstance(mass, Toleranced) and isinstance(inertia, Toleranced) and all(near_far)):
+        return ANY
+    a, b = ((max(arms) - min(arms)) / 2 for arms in near_far)
+    if min(a, b) <= 0:
+        return ANY
+    weighs = math.log(inertia.value / mass.value / (a * b))
+    return Tilting(weighs, math.hypot(FIRM, math.log(a / b)))
