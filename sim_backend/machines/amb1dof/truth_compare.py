@@ -19,7 +19,7 @@ from sim_backend.motion import CompareAsked
 
 Array = npt.NDArray[np.float64]
 SPREAD_S = 0.6  # over which the moments lie at which a switch or a load comes: whole times of both filters' pattern
-SWITCHES, LOADS = 96, 48  # how many moments
+SWITCHES, LOADS = 96, 144  # how many moments: what is left of their noise is a quarter of that of ten repeats
 SWITCHED, LOADED = ("velocity_error", "disturbance_error", "y_50_100"), ("peak", "integral", "quiet", "velocity_noise")
 AT = {name: k for k, name in enumerate(TRACE)}
 
