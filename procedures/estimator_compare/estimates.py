@@ -1,4 +1,8 @@
-"""From captures to estimates: means over the repeats, and ratios of two estimators paired by them."""
+"""From captures to estimates: geometric means over the repeats, and ratios of two estimators paired by them.
+
+What is measured is a size, and goes by the moment: rms positions after a switch are 1 to 28 um, skewed, their logarithms are
+not. Means of ten had 0.92 of their intervals hold the truth, and five times as many errors beyond 3 U as Student's t has;
+geometric means have 0.947, and tails as t."""
 
 from __future__ import annotations
 
@@ -10,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.uncertainty import Estimate, Influence
+from bench.uncertainty.estimate import Deviations
 from procedures.estimator_compare import fit
 from procedures.estimator_compare.plan import Plan
 from procedures.estimator_compare.steps import ENGAGE, HANG, Taken, of_kind
@@ -47,7 +52,9 @@ def evaluate(taken: Sequence[Taken], plan: Plan, harmonic_hz: float) -> Result:
         found = np.array([_of_load(t, plan) for t in of_kind(taken, HANG, estimator)])
         for name, column in zip(LOADED, found.T, strict=True):
             values[name][estimator] = column
-    estimates = {name: {e: _mean(x, UNITS[name], f"{name}/{e}") for e, x in by.items()} for name, by in values.items()}
+    estimates = {
+        name: {e: _typical(x, UNITS[name], f"{name}/{e}") for e, x in by.items()} for name, by in values.items()
+    }
     return Result(values, estimates, _ratios(values, plan), tuple(taken))
 
 
@@ -67,11 +74,17 @@ def _of_load(t: Taken, plan: Plan) -> tuple[float, ...]:
     return (*fit.answer(t.y, at, t.tick_s), float(t.y[quiet].std()), fit.above(t.v[quiet], t.tick_s))
 
 
-def _mean(x: Array, unit: str, identity: str) -> Estimate:
-    u = float(x.std(ddof=1)) / math.sqrt(len(x))
-    return Estimate.of(
-        float(x.mean()), Influence(f"scatter/{identity}", "scatter of the repeats", u, unit, "A", "normal", len(x) - 1)
-    )
+def _typical(x: Array, unit: str, identity: str, name: str = "scatter of the repeats") -> Estimate:
+    """Geometric mean of what is positive, with the scatter of its logarithms: an interval that is not symmetric."""
+    logs = np.log(x)
+    middle, u = float(logs.mean()), float(logs.std(ddof=1)) / math.sqrt(len(x))
+    value = math.exp(middle)
+    scatter = Influence(f"scatter/{identity}", f"{name}, relative", u, "1", "A", "normal", len(x) - 1)
+
+    def sampled(deviations: Deviations) -> Array:
+        return np.asarray(value * np.exp(deviations[scatter.id]))
+
+    return Estimate(value, unit, {scatter: value}, sampled if u else None)
 
 
 def _ratios(values: Mapping[str, Mapping[str, Array]], plan: Plan) -> dict[str, dict[str, Estimate]]:
@@ -85,9 +98,4 @@ def _ratios(values: Mapping[str, Mapping[str, Array]], plan: Plan) -> dict[str, 
 
 def _ratio(a: Array, b: Array, identity: str) -> Estimate:
     count = min(len(a), len(b))
-    logs = np.log(a[:count] / b[:count])
-    value, u = math.exp(float(logs.mean())), float(logs.std(ddof=1)) / math.sqrt(count)
-    influence = Influence(
-        f"scatter/ratio/{identity}", "scatter of the repeats, paired", value * u, "1", "A", "normal", count - 1
-    )
-    return Estimate.of(value, influence)
+    return _typical(a[:count] / b[:count], "1", f"ratio/{identity}", "scatter of the repeats, paired")

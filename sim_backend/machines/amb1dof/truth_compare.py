@@ -19,25 +19,25 @@ from sim_backend.motion import CompareAsked
 
 Array = npt.NDArray[np.float64]
 SPREAD_S = 0.6  # over which the moments lie at which a switch or a load comes: whole times of both filters' pattern
-SWITCHES, LOADS = 96, 48  # how many moments
+SWITCHES, LOADS = 96, 144  # how many moments: what is left of their noise is a quarter of that of ten repeats
 SWITCHED, LOADED = ("velocity_error", "disturbance_error", "y_50_100"), ("peak", "integral", "quiet", "velocity_noise")
 AT = {name: k for k, name in enumerate(TRACE)}
 
 
 def compare(rig: RigFile, drawn: Truth, asked: CompareAsked) -> Mapping[tuple[str, str], float]:
-    """Means over the moments by quantity and estimator, and ratios (`a / b`) of geometric means."""
-    out, logs = dict[tuple[str, str], float](), dict[tuple[str, str], float]()
+    """Geometric means over the moments by quantity and estimator, and their ratios (`a / b`)."""
+    logs = dict[tuple[str, str], float]()
     for names, of, one in ((SWITCHED, asked.engaged, _switched), (LOADED, asked.loaded, _loaded)):
         for estimator, changed in of.items():
             used = in_force(rig, drawn.machine, {**asked.settings, **changed})
             found = np.array([one(drawn, asked, used, k) for k in range(SWITCHES if one is _switched else LOADS)])
             for name, values in zip(names, found.T, strict=True):
-                out[name, estimator] = float(values.mean())
                 logs[name, estimator] = float(np.log(values).mean())
     switched, loaded = [*asked.engaged], [*asked.loaded]
     pairs = [(n, e, switched[-1]) for n in SWITCHED for e in switched[:-1]]
     pairs += [(n, e, loaded[0]) for n in LOADED for e in loaded[1:]]
-    return out | {(f"{n}_ratio", f"{a} / {b}"): math.exp(logs[n, a] - logs[n, b]) for n, a, b in pairs}
+    logs |= {(f"{n}_ratio", f"{a} / {b}"): logs[n, a] - logs[n, b] for n, a, b in pairs}
+    return {key: math.exp(log) for key, log in logs.items()}
 
 
 def _plant(drawn: Truth, used: Numbers, k: int, compensate: float) -> Plant:
