@@ -91,10 +91,11 @@ class Decoder:
 
 def aligned_type(s: Signal) -> str:
     """numpy type of a signal that a view can read, or ""."""
-    if not s.little_endian or s.start % 8 or s.length not in (8, 16, 32, 64):
+    whole = s.start % 8 == (0 if s.little_endian else 7)  # a big-endian signal's place is that of its top bit
+    if not whole or s.length not in (8, 16, 32, 64):
         return ""
     kind = "f" if s.is_float else "i" if s.signed else "u"
-    return f"<{kind}{s.length // 8}" if kind != "f" or s.length > 8 else ""
+    return f"{'<' if s.little_endian else '>'}{kind}{s.length // 8}" if kind != "f" or s.length > 8 else ""
 
 
 def grouped(message: Message) -> list[list[Signal]]:
@@ -112,7 +113,8 @@ def _extractor(group: list[Signal]) -> tuple[int, Extractor]:
     first, kind = group[0], aligned_type(group[0])
     if not kind:
         return 1, lambda payloads: bits_of(payloads, first)
-    low, high = first.start // 8, (group[-1].start + group[-1].length) // 8
+    low = first.start // 8
+    high = low + len(group) * first.length // 8
     return len(group), lambda payloads: payloads[:, low:high].view(kind).T
 
 

@@ -86,7 +86,8 @@ def _write(out: Payloads, group: list[Signal], raw: Array) -> None:
     """Put neighbours of one aligned type in by one view, and what lies at any place bit by bit."""
     first, kind = group[0], aligned_type(group[0])
     if kind:
-        low, high = first.start // 8, (group[-1].start + group[-1].length) // 8
+        low = first.start // 8
+        high = low + len(group) * first.length // 8
         with np.errstate(invalid="ignore"):
             numbers = raw if first.is_float else np.nan_to_num(raw, nan=0.0)
             out[:, low:high].view(kind)[:] = numbers.T
