@@ -22,7 +22,7 @@ from bench.errors import ConfigError
 from bench.link.codec import Decoder, encode
 from bench.link.frames import FD, empty_batch, frame
 from bench.link.session import Session
-from bench.rigfile import load_rig, protocoldoc
+from bench.rigfile import capture, load_rig, protocoldoc
 from bench.rigfile.messages import Message
 from bench.wire import captureblock, isotp, packet, slcan
 from drivers import controller, dialogue, handshake, slcan_bus, waiting
@@ -139,7 +139,8 @@ def test_the_page_of_a_rig_is_up_to_date(rig: str) -> None:
 
 
 def test_every_message_is_worked_byte_by_byte() -> None:
-    assert {name for name, _ in FRAMES} == set(MESSAGES.messages)
+    """But those of captures, which docs/reference/captures.md works."""
+    assert {name for name, _ in FRAMES} | set(capture.MESSAGES) == set(MESSAGES.messages)
 
 
 @pytest.mark.parametrize(("name", "block"), FRAMES, ids=[f"{k}-{n}" for k, (n, _) in enumerate(FRAMES)])

@@ -245,6 +245,6 @@ def test_a_rig_without_captures_has_no_such_role() -> None:
     from sim_backend.endpoint import SimulatedRig
     from sim_backend.truth import draw
 
-    rig = load_rig("tsbs12")
+    rig = load_rig("examples/vertical-spindle/spindle.toml")
     machine = SimulatedRig(rig, draw(rig, 1), 1)
     assert Controller(rig, machine.link, machine, HostSession(1, 0, "test")).capture is None

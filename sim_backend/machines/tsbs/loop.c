@@ -36,6 +36,8 @@ void tsbs_sense(const tsbs_params *p, tsbs_derived *d, tsbs_state *st, tsbs_read
     double scale = 1 + p->segment_scale_drift * now; /* of what the four sensors share */
     tsbs_reference field = {.gamma = st->applied.gamma};
     tsbs_commutate(p, d, &field);
+    d->sensed_c = field.turn_c;
+    d->sensed_s = field.turn_s;
     for (int k = 0; k < 4; k++) {
         double noise = p->current_noise * normal[15 + k];
         double along = st->segment[k] * field.turn_c + st->segment[k + 4] * field.turn_s;
@@ -170,12 +172,36 @@ static void watch(const tsbs_params *p, const tsbs_control *c, tsbs_state *st, c
     st->trips |= trips;
 }
 
+/* What a capture records of one tick, TRACE numbers: five positions, angle within a turn, speed, four segments along the field as
+ * the telemetry has them, four across it, which in an ideal drive are nothing; gamma and of what the law has just asked for i_x,
+ * i_y, torque current asked and given, its bound, lambda, and the observer's loads. */
+static void record(const tsbs_params *p, const tsbs_derived *d, tsbs_state *st, const tsbs_reading *r, const double *segment,
+                   double *out) {
+    const tsbs_law_state *l = &st->law;
+    double normal[4] = {0}, scale = 1 + p->segment_scale_drift * st->tick * TICK;
+    if (p->current_noise > 0) core_draws(&st->across_noise, normal, 4);
+    memcpy(out, r->position, sizeof r->position);
+    out[5] = remainder(r->angle, TWO_PI);
+    out[6] = st->speed;
+    memcpy(out + 7, segment, 4 * sizeof *segment);
+    for (int k = 0; k < 4; k++) {
+        double across = st->segment[k + 4] * d->sensed_c - st->segment[k] * d->sensed_s;
+        double i = scale * p->segment_sense[k] * across + p->current_noise * normal[k];
+        out[11 + k] = quantise(i, p->current_lsb, d->per_current_lsb);
+    }
+    out[15] = l->gamma;
+    memset(out + 16, 0, 8 * sizeof *out);
+    if (l->mode >= LIFT) memcpy(out + 16, l->told, sizeof l->told);
+    if (l->mode >= LIFT && l->share > 0) memcpy(out + 22, l->load, sizeof l->load);
+}
+
 void tsbs_start(const tsbs_params *p, const tsbs_control *c, tsbs_state *st, uint64_t seed) {
     int substeps = st->substeps;
     memset(st, 0, sizeof *st);
     (void)c;
     st->substeps = substeps > 0 ? substeps : 2;
     core_noise_seed(&st->noise, seed, 0);
+    core_noise_seed(&st->across_noise, seed, 1);
     double zi = p->z_sensor[0], zo = p->z_sensor[1], yi = p->ring_y[0] - p->clearance, yo = p->ring_y[1] - p->clearance;
     st->s[3] = (yi - yo) / (zo - zi); /* T (6.7): at rest on both rings */
     st->s[1] = yi + zi * st->s[3];
@@ -186,11 +212,11 @@ void tsbs_start(const tsbs_params *p, const tsbs_control *c, tsbs_state *st, uin
 }
 
 /* Runs `ticks` control ticks, or fewer when a trip occurs (then to the end of the telemetry period). Each completed
- * period appends COLUMNS numbers to `rows`: means of 5 positions, angle (last), speed, 10 coils, 4 segments, flags.
- * Returns the number of ticks run. */
+ * period appends COLUMNS numbers to `rows`: means of 5 positions, angle (last), speed, 10 coils, 4 segments, flags; every
+ * `every`-th tick (0: none) appends TRACE readings to `trace`. Returns the number of ticks run. */
 int64_t tsbs_run(const tsbs_params *p, const tsbs_control *c, tsbs_state *st, int64_t ticks, double *rows,
-                 int64_t row_limit) {
-    int64_t done = 0, filled = 0;
+                 int64_t row_limit, double *trace, int64_t every) {
+    int64_t done = 0, filled = 0, kept = 0;
     int before = st->trips;
     tsbs_derived d;
     tsbs_derive(p, TICK / st->substeps, &d);
@@ -205,6 +231,7 @@ int64_t tsbs_run(const tsbs_params *p, const tsbs_control *c, tsbs_state *st, in
         tsbs_commutate(p, &d, &st->next);
         st->speed = d.speed_keep * st->speed + (1 - d.speed_keep) * (r.angle - st->angle_before) / TICK;
         st->angle_before = r.angle;
+        if (every && st->tick % every == 0) record(p, &d, st, &r, segment, trace + TRACE * kept++);
         watch(p, c, st, coil, st->speed);
         for (int k = 0; k < 5; k++) st->sums[k] += r.position[k];
         st->sums[5] = r.angle;

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Literal, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +17,13 @@ CHANNELS: Final = (
     *(f"i_m{k}" for k in range(1, 5)),
     "flags",
 )
+TRACE: Final = (
+    *CHANNELS[:7],
+    *(f"i_m{k}" for k in range(1, 5)),
+    *(f"i_d{k}" for k in range(1, 5)),
+    *("gamma", "demand_x", "demand_y", "torque_asked", "torque_given", "torque_bound", "lambda", "load_x", "load_y"),
+)
+"""Of one tick: what is read, and what the law makes of it, which the amplifiers are told a tick later."""
 _ffi, _lib = open_core(Path(__file__).with_name("tsbs.h"))
 
 
@@ -108,17 +115,27 @@ class Plant(CorePlant):
         parts = list(self._s.segment)
         return [complex(*pair) for pair in zip(parts[:4], parts[4:], strict=True)]
 
-    def run(self, ticks: int) -> Array:
+    @overload
+    def run(self, ticks: int, trace: Literal[0] = 0) -> Array: ...
+    @overload
+    def run(self, ticks: int, trace: Literal[1, 2, 5, 10, 20, 50, 100]) -> tuple[Array, Array]: ...
+    @overload
+    def run(self, ticks: int, trace: int) -> Array | tuple[Array, Array]: ...
+    def run(self, ticks: int, trace: int = 0) -> Array | tuple[Array, Array]:
         """Advance by `ticks` control ticks, or to the end of the telemetry period in which a trip occurs.
 
         Returns:
-            (n, len(CHANNELS)) float64, one row per completed telemetry period of ten ticks.
+            (n, len(CHANNELS)) float64, one row per completed telemetry period of ten ticks; with `trace`, also the readings of
+            every `trace`-th tick, (k, len(TRACE)).
         """
+        start = self.tick
         limit = (ticks + PERIOD_TICKS - 1) // PERIOD_TICKS + 1
         rows = np.empty((limit, len(CHANNELS)))
-        done = _lib.tsbs_run(self._p, self._c, self._s, ticks, _ffi.from_buffer("double[]", rows.data), limit)
-        tick = self.tick
-        return rows[: tick // PERIOD_TICKS - (tick - done) // PERIOD_TICKS]
+        kept = np.empty((ticks // trace + 1 if trace else 0, len(TRACE)))
+        at, into = (_ffi.cast("double *", x.ctypes.data) for x in (rows, kept))
+        _lib.tsbs_run(self._p, self._c, self._s, ticks, at, limit, into, trace)
+        rows = rows[: self.tick // PERIOD_TICKS - start // PERIOD_TICKS]
+        return (rows, kept[: -(-self.tick // trace) - -(-start // trace)]) if trace else rows
 
     def state(self) -> dict[str, Any]:
         """True state, for tests: `s` (14,) positions and rates, `coil` (10,), `segment` (4,) complex in the stator's frame,

@@ -88,14 +88,15 @@ typedef struct {
     double lever_inertia, ring_inertia;
     tsbs_reference applied, next;
     tsbs_law_state law;
-    core_noise noise;
+    core_noise noise, across_noise; /* the second of what captures alone read */
     double speed, angle_before, sums[24];
     int64_t tick, trip_tick;
     int32_t trips, lost_ticks, flags, in_period, substeps, freed;
 } tsbs_state;
 
 void tsbs_start(const tsbs_params *, const tsbs_control *, tsbs_state *, uint64_t seed);
-int64_t tsbs_run(const tsbs_params *, const tsbs_control *, tsbs_state *, int64_t ticks, double *rows, int64_t row_limit);
+int64_t tsbs_run(const tsbs_params *, const tsbs_control *, tsbs_state *, int64_t ticks, double *rows, int64_t row_limit,
+                 double *trace, int64_t every);
 void tsbs_derivative(const tsbs_params *, const double *s, const double *coil, const double *segment,
                      const double *play, double gamma, double hung_mass, double weight, const double *lever, double *ds);
 void tsbs_law(const tsbs_control *, tsbs_law_state *, const tsbs_reading *, tsbs_reference *);
@@ -104,6 +105,7 @@ double tsbs_amb_force(double beta, double gap, double xi, double coil_p, double 
 
 enum { SEGMENT_SATURATED = 2 };
 #define COLUMNS 22
+#define TRACE 24
 
 /* what does not change inside a run or a tick: harmonic coefficients a cos p and a sin p, sines, decays */
 typedef struct {
@@ -116,7 +118,7 @@ typedef struct {
     double axis_beta[4], axis_gap[4], axis_z[4], axis_offset[4], runout[4][4];
     double unbalance, gravity_x, gravity_y;
     /* of this tick: M times the angle, and by how much the field is turned; the drive, the drag, the lever, the inertia */
-    double pole_pairs, pole_c, pole_s, field, field_c, field_s;
+    double pole_pairs, pole_c, pole_s, field, field_c, field_s, sensed_c, sensed_s;
     double drive_gain, drive_limit, drive_speed, viscous, coulomb;
     double lever_weight, lever_c, lever_s, polar_inertia, per_polar;
 } tsbs_derived;
