@@ -69,6 +69,9 @@ def test_the_load_of_tsbs12() -> None:
     load = bus_load(rig.messages, rig.link.bitrate, rig.link.data_bitrate)
     # telemetry 170 us a ms; heartbeat 57 us in 20 ms; on demand 50 times a second 57 us (8 bytes), 49 us (4), 170 us (64)
     by_hand = 0.170 + 57e-6 / 20e-3 + ON_DEMAND_HZ * (4 * 57e-6 + 2 * 49e-6 + 2 * 170e-6)
+    # of captures CaptureArm and CaptureStatus (32 bytes): 261 + 66 + 33 = 360 fast, 34 us slow: 106 us; CaptureAsk 57 us;
+    # CaptureRead (12): 101 + 26 + 28 = 155: 65 us; CaptureFlow (3): 29 + 8 + 28 = 65: 47 us; CaptureBlock, CaptureData 170 us
+    by_hand += ON_DEMAND_HZ * (2 * 106e-6 + 57e-6 + 65e-6 + 47e-6 + 2 * 170e-6)
     assert load.total == pytest.approx(by_hand, rel=1e-12)
 
 

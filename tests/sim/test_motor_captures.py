@@ -10,6 +10,7 @@ import pytest
 from sim_plants import centred, levitated
 
 from bench.rigfile import load_rig
+from sim_backend.core import LAND, READY
 from sim_backend.machines.tsbs.machine import TSBS
 from sim_backend.machines.tsbs.params import PlantParams
 from sim_backend.machines.tsbs.plant import CHANNELS, TRACE, Plant
@@ -145,3 +146,18 @@ def test_a_rotor_that_rests_is_asked_for_nothing() -> None:
     rows = plant.run(100, 1)[1]
     assert not column(rows, "demand_x", "demand_y", "torque_asked", "torque_given", "torque_bound", "lambda").any()
     assert column(rows, "pos_yo").mean() == pytest.approx(-250e-6, abs=2e-6)
+
+
+def test_what_was_asked_for_before_a_landing_is_not_told_after_it() -> None:
+    """Handed back, the motor has no load; at rest, nothing is asked for. The law's last numbers stay in its memory."""
+    plant = levitated(centred())
+    plant.set("motor_share", 1.0)
+    plant.run(20000)
+    assert column(plant.run(10, 1)[1], "load_y").max() < -40
+    plant.set("motor_share", 0.0)
+    plant.run(20000)
+    assert not column(plant.run(100, 1)[1], "load_x", "load_y").any()
+    plant.mode = LAND
+    plant.run(12000)
+    plant.mode = READY
+    assert not column(plant.run(100, 1)[1], "torque_bound", "lambda", "demand_y").any()
