@@ -131,9 +131,9 @@ def _bound(native: RigFile, toml: str, called: Mapping[str, str], replies: bool)
     if not replies:
         place = {name: f"Vorgabe{k // 16}.Groesse{k}" for k, name in enumerate(native.parameters)}
         numbers = {p.index: place[name] for name, p in native.parameters.items()}
-        at, end = toml.index("\n[parameters]"), toml.index("\n[plans")
+        at, end, plans = (toml.index(f"\n[{name}") for name in ("parameters]", "capture]", "plans"))
         asked = re.sub(r"\{ index = (\d+)", lambda m: f'{{ signal = "{numbers[int(m[1])]}"', toml[at:end])
-        toml = toml[:at] + asked + toml[end:]
+        toml = toml[:at] + asked + toml[plans:]  # captures are messages of the protocol, with replies
         toml = re.sub(r"protocol = 1\nmap_version = 2\n", "", toml)
         binding.append("[devices.controller.binding.commands]")
         for command, on in LEVELS.items():
