@@ -171,19 +171,29 @@ def nonlinear(r: Array, p: Array, n: Array, force: Array, gap: float) -> Fit:
         slope = 2 * terms[0] * (p**2 / near**3 + n**2 / far**3)
         return np.column_stack([(p / near) ** 2 - (n / far) ** 2, slope])
 
-    return leastsquares.nonlinear(model, force, _start(r, p, n, force, gap), jacobian=jacobian)
+    found: list[Fit] = []
+    for start in _starts(r, p, n, force, gap):
+        try:
+            found.append(leastsquares.nonlinear(model, force, start, jacobian=jacobian))
+        except AnalysisError as error:
+            why = error
+    if not found:
+        raise why
+    return min(found, key=lambda fit: fit.chi2)
 
 
-def _start(r: Array, p: Array, n: Array, force: Array, gap: float) -> Array:
-    """The best of a row of offsets, each with the beta that fits it best: the sum of squares has several valleys where the
-    wiring is wrong."""
+def _starts(r: Array, p: Array, n: Array, force: Array, gap: float) -> list[Array]:
+    """The bottom of each valley of the sum of squares in a row of offsets, each with the beta that fits it best. There are
+    several where the wiring is wrong, and two alike where equal currents carry the load: in that of -beta at -offset a row so
+    coarse may lie lower."""
     room = gap - float(np.abs(r).max())
     offsets = np.linspace(-0.8, 0.8, 33) * room
     unit = np.array([magnet(1.0, o, gap, r, p, n) for o in offsets])
     betas = (unit @ force) / (unit**2).sum(axis=1)
     left = ((force - betas[:, None] * unit) ** 2).sum(axis=1)
-    best = int(np.argmin(left))
-    return np.array([betas[best], offsets[best]])
+    walled = np.concatenate([[np.inf], left, [np.inf]])
+    bottoms = np.flatnonzero((left <= walled[:-2]) & (left < walled[2:]))
+    return [np.array([betas[k], offsets[k]]) for k in bottoms]
 
 
 def linear(r: Array, p: Array, n: Array, force: Array) -> Fit:

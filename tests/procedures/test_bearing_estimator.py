@@ -227,3 +227,15 @@ def test_where_a_failed_lift_presses_the_shaft_tells_the_exchange() -> None:
     assert left[""] < 0.5
     assert min(left, key=lambda k: left[k]) == ""
     assert left["yi with yo"] > 4
+
+
+@pytest.mark.parametrize("control", [-0.02, 0.0, 0.02])
+def test_equal_currents_that_carry_the_load_leave_no_second_magnet(control: float) -> None:
+    """A magnet of -beta at -offset pulls as much where both coils carry the same: a row of offsets 22 um apart may fit it better,
+    but never a fit that went to the bottom of either valley."""
+    r = np.linspace(-80e-6, 80e-6, 9)
+    for offset in np.arange(100e-6, 160e-6, 1e-6):
+        load = BETA * (((BIAS + control) / (GAP - offset)) ** 2 - ((BIAS - control) / (GAP + offset)) ** 2)
+        force = np.full_like(r, load) - 190 * r  # the coupling's part
+        fit = magnetics.nonlinear(r, *currents(force, offset + r), force, GAP)
+        assert fit.terms == pytest.approx([BETA, offset], rel=1e-6)
