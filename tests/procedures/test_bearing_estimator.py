@@ -231,8 +231,8 @@ def test_where_a_failed_lift_presses_the_shaft_tells_the_exchange() -> None:
 
 @pytest.mark.parametrize("control", [-0.02, 0.0, 0.02])
 def test_equal_currents_that_carry_the_load_leave_no_second_magnet(control: float) -> None:
-    """A magnet of -beta at -offset pulls as much where both coils carry the same: a row of offsets 22 um apart may fit it better,
-    but never a fit that went to the bottom of either valley."""
+    """A magnet of -beta at -offset pulls as much where both coils carry the same: in a row of offsets 22 um apart it may fit
+    better, but not at the bottom of its valley."""
     r = np.linspace(-80e-6, 80e-6, 9)
     for offset in np.arange(100e-6, 160e-6, 1e-6):
         load = BETA * (((BIAS + control) / (GAP - offset)) ** 2 - ((BIAS - control) / (GAP + offset)) ** 2)
