@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from bench.errors import AnalysisError
 from bench.rigfile.numbers import Sum
 from procedures.amb_rotor.conventions import AMB_ROTOR, AmbRotor
 from procedures.amb_rotor.stations import Placed, row, upward
