@@ -42,6 +42,7 @@ Row = tuple[float, float, float, float]
 """Error, half width, standard uncertainty and true value."""
 Found = Iterator[tuple[str, str, float, float, float]]  # axis, quantity, value, half width, standard uncertainty
 AMB_ROTOR = conventions(load_rig("amb5dof"))
+INJECTION = load_rig("amb5dof").capabilities.injection
 
 
 def light(p: AmbParams, settings: Mapping[str, float], plan: Plan, seed: int) -> Found:
@@ -64,7 +65,7 @@ def light(p: AmbParams, settings: Mapping[str, float], plan: Plan, seed: int) ->
 
 def _taken(plant: AmbPlant, plan: Plan, axis: str, kind: str, about: float, comb: Comb) -> Taken:
     speed = plan.speeds_rad_s[0]
-    for name, value in {**parameters_of(comb), "inject_axis": float(AMB_ROTOR.all_axes.index(axis))}.items():
+    for name, value in {**parameters_of(INJECTION, comb), "inject_axis": float(AMB_ROTOR.all_axes.index(axis))}.items():
         plant.set(name, value)
     plant.run(round(plan.start_s * 1e4))
     pulses = MARGIN_S + 4 * math.pi / speed if speed else 0.0

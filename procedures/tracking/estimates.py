@@ -11,12 +11,12 @@ import numpy as np
 from bench.rigfile import RigFile
 from bench.rigfile.toleranced import Toleranced
 from bench.uncertainty import Estimate, Influence
-from bench.uncertainty.series import batch_means
 from procedures.amb_rotor.geometry import Facts, lengths, nominal
 from procedures.amb_rotor.stations import stations
 from procedures.shared.certificates import certified
-from procedures.tracking.ellipse import Path, Turns, of_points, quantities, revolutions, turns
-from procedures.tracking.steps import Orbit, upper_and_lower
+from procedures.tracking.currents import of_coils
+from procedures.tracking.ellipse import Path, Turns, of_points, quantities, turns
+from procedures.tracking.steps import Orbit
 
 TIMING_TICKS = 0.5  # half width: how the reference's zero of phase stands to the answer of the currents
 UNITS = {"error": "m", "contour": "m", "amplitude": "1", "phase": "rad", "tilt": "rad", "ring": "m"}
@@ -90,7 +90,7 @@ def inputs(rig: RigFile, tick_s: float, runout_m: float) -> list[Input]:
 
 def by_law(orbits: Sequence[Orbit], rig: RigFile, runout_m: float) -> dict[str, dict[str, Estimate]]:
     """Every quantity of each law."""
-    return {o.law: {**_of_path(o, rig, runout_m), **({} if o.path.points else _of_coils(o, rig))} for o in orbits}
+    return {o.law: {**_of_path(o, rig, runout_m), **({} if o.path.points else of_coils(o, rig))} for o in orbits}
 
 
 def _told(path: Path) -> Callable[[Turns], dict[str, float]]:
@@ -166,32 +166,3 @@ def _small(identity: str, name: str, u: float, unit: str) -> Estimate:
     return Estimate.of(
         0.0, Influence(id=identity, name=name, u=u, unit=unit, kind="B", distribution="normal", source="evaluation")
     )
-
-
-def _of_coils(orbit: Orbit, rig: RigFile) -> dict[str, Estimate]:
-    out, per = {}, revolutions(orbit.path)
-    batches = max(2, min(16, len(per) // 2))
-    upper, lower = upper_and_lower(orbit.machine)
-    for quantity, names, currents in (("lower_current", lower, orbit.lower), ("upper_current", upper, orbit.upper)):
-        means = currents.mean(axis=1)
-        k = int(np.argmax(means))
-        s = rig.sensors[names[k]]
-        gain, offset = (
-            certified(f"sensors/{names[k]}/{what}", t) for what, t in (("gain", s.gain), ("offset", s.offset))
-        )
-        found = batch_means([currents[k, m].mean() for m in per], batches)
-        seen = Estimate.of(
-            found.value,
-            Influence(
-                id=f"scatter/{orbit.law}/{quantity}",
-                name="scatter of the current",
-                u=found.u,
-                unit="A",
-                kind="A",
-                distribution="normal",
-                dof=found.dof,
-                source=f"{batches} batches of revolutions of the reference",
-            ),
-        )
-        out[quantity] = replace((seen - offset) / gain, unit="A")
-    return out
