@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.special import ndtr
 
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
@@ -42,6 +41,8 @@ def of_coils(orbit: Orbit, rig: RigFile) -> dict[str, Estimate]:
 def likely(values: Sequence[float], us: Sequence[float]) -> list[float]:
     """How likely each of independent normal values (n,) with standard deviations `us` is the greatest: integral of its density
     by the distributions of the others. 1 for one that is so beyond doubt."""
+    from scipy.special import ndtr
+
     v, u = np.array(values), np.array(us)
     if (v.max() - v < APART * np.hypot(u, u[v.argmax()])).sum() == 1:
         return [float(k == v.argmax()) for k in range(v.size)]
