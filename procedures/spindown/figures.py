@@ -37,7 +37,7 @@ def _firsts(runs: Sequence[RunDown]) -> dict[str, RunDown]:
 def _speeds(firsts: dict[str, RunDown]) -> Figure:
     series = []
     for name, r in firsts.items():
-        c = r.of_speed
+        c = r.of_speed or r.of_angle
         thin = slice(None, None, max(1, len(r.t) // 18))
         series.append(Series(name, r.t[thin], r.speed[thin], "points"))
         series.append(Series(f"{name}, fit", r.t, fit.speed(r.t, c.b, c.c, c.speed)))
@@ -49,10 +49,15 @@ def _residuals(firsts: dict[str, RunDown]) -> Iterator[Figure]:
     for key, what, unit in (("angle", "angle", "mrad"), ("speed", "speed", "mrad/s")):
         series = []
         for name, r in firsts.items():
-            rest = (r.of_angle if key == "angle" else r.of_speed).fit.residuals
+            found = r.of_angle if key == "angle" else r.of_speed
+            if found is None:
+                continue
+            rest = found.fit.residuals
             count = len(rest) // MEAN * MEAN
             t, e = (x[:count].reshape(-1, MEAN).mean(axis=1) for x in (r.t, rest))
             series.append(Series(name, t, 1e3 * e, "both"))
+        if not series:
+            continue
         yield Figure(f"residuals-{key}", f"Residuals of the {what}", f"Measured {what} less its fit, mean over {MEAN} ms. A "
                      "sound run-down leaves the counts of the encoder; a wave over all of it would be drag of another shape.",
                      "time (s)", f"residual ({unit})", tuple(series), lines=(("zero", 0.0),))  # fmt: skip
