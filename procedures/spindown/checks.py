@@ -93,20 +93,22 @@ def _same_level(runs: Sequence[RunDown], plan: Plan) -> Iterator[Finding]:
     off = []
     for r in runs:
         a, s = r.of_angle, r.of_speed
+        if s is None:
+            continue
         expected = (a.speed + a.c / a.b) / (1 - a.b * tau) - a.c / a.b
-        off.append(s.speed / expected - 1)
-    worst = int(np.argmax(np.abs(off)))
-    if abs(off[worst]) > SAME_SPEED:
+        off.append((s.speed / expected - 1, r.where))
+    worst, where = max(off, key=lambda found: abs(found[0]), default=(0.0, ""))
+    if abs(worst) > SAME_SPEED:
         yield Finding(
             "speed-and-angle-disagree",
-            f"the speed channel starts {off[worst]:+.2%} off the derivative of the angle ({SAME_SPEED:.1%} allowed): the scale "
-            "of one of them is wrong.", runs[worst].where, Effect.INDETERMINATE,
+            f"the speed channel starts {worst:+.2%} off the derivative of the angle ({SAME_SPEED:.1%} allowed): the scale "
+            "of one of them is wrong.", where, Effect.INDETERMINATE,
         )  # fmt: skip
 
 
-def of_result(runs: Sequence[RunDown], angle: Drag, speed: Drag, plan: Plan) -> Iterator[Finding]:
+def of_result(runs: Sequence[RunDown], angle: Drag, speed: Drag | None, plan: Plan) -> Iterator[Finding]:
     """Checks of the result: both fits agree, repeats agree, directions agree, friction is that of a free rotor."""
-    yield from _agreement(angle, speed)
+    yield from _agreement(angle, speed) if speed is not None else _angle_alone(runs)
     yield from _repeats(angle)
     yield from _directions(angle)
     yield from _shape(runs)
@@ -121,6 +123,17 @@ def of_result(runs: Sequence[RunDown], angle: Drag, speed: Drag, plan: Plan) -> 
     elif coulomb.value < -3 * coulomb.u - 1e-3:
         yield Finding("driven", f"a constant torque of {-coulomb.value:.3f} N m drives the coasting rotor in both directions.",
                       "T_c", Effect.INDETERMINATE)  # fmt: skip
+
+
+def _angle_alone(runs: Sequence[RunDown]) -> Iterator[Finding]:
+    """Nothing judges the angle by the speed: the run-down is over before the filter is."""
+    short = [r for r in runs if r.of_speed is None]
+    lasted = min(float(r.t[-1]) for r in short)
+    text = (
+        f"{len(short)} of {len(runs)} run-downs, down to {lasted:.2f} s, are too short for the filtered speed: the results are "
+        "those of the angle, from the release on, and no speed stands beside them."
+    )
+    yield Finding("angle-alone", text, short[0].where)
 
 
 def _agreement(angle: Drag, speed: Drag) -> Iterator[Finding]:

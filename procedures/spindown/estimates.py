@@ -26,7 +26,7 @@ from procedures.spindown.fit import Coast, inertia_from_ring
 from procedures.spindown.steps import RunDown, coils
 
 Array = npt.NDArray[np.float64]
-METHODS: Mapping[str, Callable[[RunDown], Coast]] = {"angle": lambda r: r.of_angle, "speed": lambda r: r.of_speed}
+METHODS: Mapping[str, Callable[[RunDown], Coast]] = {"angle": lambda r: r.of_angle, "speed": lambda r: _by_speed(r)}
 RESIDUAL_DOF = 30.0  # of a covariance from correlated residuals: a coast holds some thirty independent stretches
 
 
@@ -59,6 +59,12 @@ def grouped(runs: Sequence[RunDown], bias_A: float) -> dict[str, list[RunDown]]:
     for r in runs:
         out.setdefault("ring" if r.ring else "low" if r.bias_A == bias_A else "high", []).append(r)
     return out
+
+
+def _by_speed(run: RunDown) -> Coast:
+    if run.of_speed is None:
+        raise AnalysisError(f"run-down {run.where}: found no fit of its speed; expected one (it is too short)")
+    return run.of_speed
 
 
 def rates(runs: Sequence[RunDown], coast: Callable[[RunDown], Coast]) -> Rates:
@@ -97,7 +103,8 @@ def evaluate(runs: Sequence[RunDown], rig: RigFile, method: str, bias_A: float, 
     """B, B_high, T_c (and J_z with a ring) by one of METHODS, with all influences.
 
     Raises:
-        AnalysisError: a bias or a direction is missing, or the ring does not slow the decay.
+        AnalysisError: a bias or a direction is missing, a run-down is too short for that method, or the ring does not slow the
+            decay.
     """
     groups = grouped(runs, bias_A)
     if not {"low", "high"} <= groups.keys():

@@ -37,22 +37,35 @@ def _firsts(runs: Sequence[RunDown]) -> dict[str, RunDown]:
 def _speeds(firsts: dict[str, RunDown]) -> Figure:
     series = []
     for name, r in firsts.items():
-        c = r.of_speed
-        thin = slice(None, None, max(1, len(r.t) // 18))
-        series.append(Series(name, r.t[thin], r.speed[thin], "points"))
+        c, (t, w) = r.of_speed or r.of_angle, _points(r)
+        series.append(Series(name, t, w, "points"))
         series.append(Series(f"{name}, fit", r.t, fit.speed(r.t, c.b, c.c, c.speed)))
     return Figure("speed", "Speed after the release", "One run-down at each bias, forward, with the fit of viscous and "
-                  "constant drag; a few samples are drawn.", "time (s)", "speed (rad/s)", tuple(series))  # fmt: skip
+                  "constant drag; a few samples are drawn, of a short run-down the slopes of its angle.",
+                  "time (s)", "speed (rad/s)", tuple(series))  # fmt: skip
+
+
+def _points(run: RunDown) -> tuple[Array, Array]:
+    """A few speeds in rad/s and their times in s: of a short run-down by the angle, which no filter delays."""
+    if run.of_speed is None:
+        return np.array([part.mean() for part in np.array_split(run.t, STRETCHES)]), deceleration(run)[0]
+    thin = slice(None, None, max(1, len(run.t) // 18))
+    return run.t[thin], run.speed[thin]
 
 
 def _residuals(firsts: dict[str, RunDown]) -> Iterator[Figure]:
     for key, what, unit in (("angle", "angle", "mrad"), ("speed", "speed", "mrad/s")):
         series = []
         for name, r in firsts.items():
-            rest = (r.of_angle if key == "angle" else r.of_speed).fit.residuals
+            found = r.of_angle if key == "angle" else r.of_speed
+            if found is None:
+                continue
+            rest = found.fit.residuals
             count = len(rest) // MEAN * MEAN
             t, e = (x[:count].reshape(-1, MEAN).mean(axis=1) for x in (r.t, rest))
             series.append(Series(name, t, 1e3 * e, "both"))
+        if not series:
+            continue
         yield Figure(f"residuals-{key}", f"Residuals of the {what}", f"Measured {what} less its fit, mean over {MEAN} ms. A "
                      "sound run-down leaves the counts of the encoder; a wave over all of it would be drag of another shape.",
                      "time (s)", f"residual ({unit})", tuple(series), lines=(("zero", 0.0),))  # fmt: skip

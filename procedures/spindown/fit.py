@@ -84,16 +84,16 @@ def of_speed(t: npt.ArrayLike, w: npt.ArrayLike, lags: int) -> Coast:
     return _coast(fit, lags)
 
 
-def of_angle(t: npt.ArrayLike, theta: npt.ArrayLike, lags: int) -> Coast:
-    """Fit b, c, w_0 and theta_0 to unwrapped angles (n,) rad, growing in the direction of turning.
+def of_angle(t: npt.ArrayLike, theta: npt.ArrayLike, lags: int, fewest: int = 400) -> Coast:
+    """Fit b, c, w_0 and theta_0 to unwrapped angles (n,) rad, growing in the direction of turning; n is `fewest` or more.
 
     Raises:
         AnalysisError: too few samples, a rotor that does not slow down, or no convergence.
     """
     time, values = np.asarray(t, np.float64), np.asarray(theta, np.float64)
     parts = np.array_split(np.arange(len(time)), 40)
-    if len(time) < 400:
-        raise AnalysisError(f"run-down: found {len(time)} angles; expected 400 or more")
+    if len(time) < fewest:
+        raise AnalysisError(f"run-down: found {len(time)} angles; expected {fewest} or more")
     rates = [(values[k[-1]] - values[k[0]]) / (time[k[-1]] - time[k[0]]) for k in parts]
     b, c, start = _guess(np.array([time[k].mean() for k in parts]), np.array(rates))
     fit = nonlinear(lambda p: p[3] + angle(time, *p[:3]), values, [b, c, start, values[0]])

@@ -144,7 +144,7 @@ class Analysis:
 
     runs: list[RunDown]
     angle: Drag
-    speed: Drag
+    speed: Drag | None  # where a run-down is too short for the speed's filter
     inertia: Estimate
 
 
@@ -154,7 +154,9 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis | Coast
         return coasting.evaluate(recording, findings)
     findings.gate(checks.before_fits(recording))
     plan, rig, runs = recording.plan, recording.rig, read_run_downs(recording)
-    angle, speed = (estimates.evaluate(runs, rig, m, plan.bias_A, plan.bias_high_A) for m in ("angle", "speed"))
+    angle = estimates.evaluate(runs, rig, "angle", plan.bias_A, plan.bias_high_A)
+    whole = all(r.of_speed is not None for r in runs)
+    speed = estimates.evaluate(runs, rig, "speed", plan.bias_A, plan.bias_high_A) if whole else None
     findings.add(checks.of_runs(runs, conventions(rig), plan))
     findings.add(checks.of_result(runs, angle, speed, plan))
     findings.add([*checks.of_drive(recording, angle), *checks.of_inertia(rig, angle)])
@@ -166,8 +168,8 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis | Coast
 
 
 def measured(a: Analysis | Coasted) -> Iterator[Measured]:
-    """B and T_c by the speed, and all quantities by the angle, which are the results."""
-    if isinstance(a, Analysis):
+    """B and T_c by the speed if it could be fitted, and all quantities by the angle, which are the results."""
+    if isinstance(a, Analysis) and a.speed is not None:
         for quantity in (B, T_C):
             yield quantity.measured(a.speed.estimates[quantity.name], "by the speed channel")
     estimates = facts(a)

@@ -21,7 +21,11 @@ ANGLE_LAGS = 60  # samples of 1 ms over which its residuals repeat themselves
 SPEED_LAGS = 200
 """The speed is the angle differentiated: its noise takes back what it adds, and only far beyond the 8 ms of its filter
 does the sum over the lags come near what is left."""
-SMALLEST_SAMPLES = 400
+LONG_SAMPLES = 400
+"""Fewer, and the speed is not fitted: its filter's transient and correlation take too much of so short a run-down."""
+SHORT_LAGS = 5  # for the angle then: it moves by two counts and more a sample, whose errors hardly repeat
+SMALLEST_SAMPLES = 150
+RELEASE_S = 0.01  # a command and the amplifiers: what drove the rotor is gone
 
 
 def coils(machine: Servomotor) -> tuple[str, ...]:
@@ -37,7 +41,8 @@ def channels(machine: Servomotor) -> tuple[str, ...]:
 @dataclass(frozen=True)
 class RunDown:
     """One coast. `t` (n,) s from the first sample used, `speed` (n,) rad/s and `angle` (n,) rad in the direction of turning;
-    fits of both; mean coil currents A by channel; mean segment currents (4,) A; the speed before it was let go."""
+    fits of both, of a short one of the angle alone; mean coil currents A by channel; mean segment currents (4,) A; the speed
+    before it was let go."""
 
     bias_A: float
     direction: int
@@ -46,7 +51,7 @@ class RunDown:
     t: Array
     speed: Array
     angle: Array
-    of_speed: Coast
+    of_speed: Coast | None
     of_angle: Coast
     coils: Mapping[str, float]
     segments: Array
@@ -62,7 +67,7 @@ class RunDown:
 
 
 def read_run_downs(recording: Recording[Plan]) -> list[RunDown]:
-    """Every "coast" step, fitted between the filter's transient and the end speed.
+    """Every "coast" step, fitted between the filter's transient and the end speed; a short one from its release.
 
     Raises:
         AnalysisError: there are none, or one is too short to be fitted.
@@ -82,33 +87,33 @@ def _read(step: Step, machine: Servomotor, delay_s: float, end: float) -> RunDow
     t = (data["t_ns"] - data["t_ns"][0]).astype(np.float64) * 1e-9 if len(data["t_ns"]) else np.zeros(0)
     speed, angle = direction * data[SPEED], direction * np.unwrap(data[ANGLE])
     used = _span(t, speed, delay_s, end)
+    long = used.stop - used.start >= LONG_SAMPLES
+    if not long:
+        used = _span(t, speed, min(delay_s, RELEASE_S), end)
     if used.stop - used.start < SMALLEST_SAMPLES:
-        raise AnalysisError(_too_short(name, t, used, delay_s, end))
-    t, speed, angle = t[used] - t[used.start], speed[used], angle[used]
+        raise AnalysisError(_too_short(name, t, used, end))
+    t, speed, angle = t[used] - t[used.start], speed[used], angle[used] - angle[used.start]
     return RunDown(
         bias_A=float(labels["bias_A"]), direction=direction, repeat=int(labels["repeat"]), ring=bool(labels["ring"]),
-        t=t, speed=speed, angle=angle - angle[0],
-        of_speed=fit.of_speed(t, speed, SPEED_LAGS), of_angle=fit.of_angle(t, angle - angle[0], ANGLE_LAGS),
+        t=t, speed=speed, angle=angle,
+        of_speed=fit.of_speed(t, speed, SPEED_LAGS) if long else None,
+        of_angle=fit.of_angle(t, angle, ANGLE_LAGS if long else SHORT_LAGS, SMALLEST_SAMPLES),
         coils={c: float(data[c][used].mean()) for c in coils(machine)},
         segments=np.array([float(data[c][used].mean()) for c in machine.segments]),
         lost=step.lost(), expected=step.expected(), flags=int(np.bitwise_or.reduce(data[STATUS].astype(np.int64))),
     )  # fmt: skip
 
 
-def _too_short(name: str, t: Array, used: slice, delay_s: float, end: float) -> str:
+def _too_short(name: str, t: Array, used: slice, end: float) -> str:
     """Why a run-down cannot be fitted, and what to do: the rotor stops too soon, or samples are missing."""
     found = used.stop - used.start
     lasted = float(t[used.stop - 1] - t[used.start]) if found else 0.0
-    start = (
-        f"run-down {name}: found {found} samples between {delay_s:g} s after the release and {end:g} rad/s; expected "
-        f"{SMALLEST_SAMPLES} or more"
-    )
+    start = f"run-down {name}: found {found} samples between the release and {end:g} rad/s; expected {SMALLEST_SAMPLES} or more"
     if used.stop >= len(t):
         return f"{start}. The recording ends there: look for a run that was stopped, or give a longer coast_s"
     return (
-        f"{start}. The rotor stops too soon: it falls to {end:g} rad/s within {lasted + delay_s:.2f} s. Give a higher "
-        "speed_rad_s, a lower end_speed_rad_s or a shorter start_delay_s; if it ran longer before, look for a brake, a rub or "
-        "a bearing current that drags"
+        f"{start}. The rotor stops too soon: it falls to {end:g} rad/s within {lasted:.2f} s. Give a higher speed_rad_s or a "
+        "lower end_speed_rad_s; if it ran longer before, look for a brake, a rub or a bearing current that drags"
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -154,7 +155,24 @@ def test_a_wrong_ring_contradicts_the_drawing(tmp_path: Path) -> None:
 
 def test_a_rotor_that_stops_too_soon_is_told_so(tmp_path: Path) -> None:
     with pytest.raises(AnalysisError, match="stops too soon: it falls to 3 rad/s"):
-        run_down(tmp_path, 1, {"viscous": 3 * 0.081}, run_up="motor")
+        run_down(tmp_path, 1, {"viscous": 0.4}, run_up="motor", speed_rad_s=12.5)
+
+
+def test_a_run_down_of_a_tenth_of_a_second_is_evaluated_by_its_angle(tmp_path: Path) -> None:
+    """J/B is 0.1 s at 3 A, 0.07 s at 4 A: from 45 rad/s it is over in 0.3 and 0.2 s, of which the speed's filter takes one."""
+    run = run_down(tmp_path, 6, {"viscous": 0.32, "polar_inertia": 0.033, "drive_drag": 0.005}, run_up="motor",
+                   speed_rad_s=45)  # fmt: skip
+    assert serious(run) == {}
+    assert "angle-alone" in {f.code for f in run.results if isinstance(f, Finding)}
+    assert not [m for m in run.results if isinstance(m, Measured) and m.where]
+    for name, e in results(run).items():
+        if name == "J_z":
+            continue
+        u = math.sqrt(
+            sum(c**2 for i, c in e.contributions.items() if i not in ("machine/polar_inertia", "machine/drive_drag"))
+        )
+        assert abs(e.value - run.truth[name]) < 3.5 * u, name
+        assert u < (2e-3 if name == "T_c" else 2e-3 * e.value), name
 
 
 def test_a_drive_that_can_do_no_more_lets_go_a_little_below(tmp_path: Path) -> None:

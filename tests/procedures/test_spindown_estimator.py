@@ -13,7 +13,7 @@ from scipy.signal import lfilter
 
 from bench.errors import AnalysisError
 from procedures.spindown import fit
-from procedures.spindown.steps import SPEED_LAGS
+from procedures.spindown.steps import SHORT_LAGS, SMALLEST_SAMPLES, SPEED_LAGS
 
 RPM = math.pi / 30
 J, B, T_C = 0.033, 0.081, 0.1
@@ -109,6 +109,22 @@ def test_the_scatter_is_what_the_covariance_says() -> None:
         b.append(coast.b)
         u.append(math.sqrt(coast.covariance[0, 0]))
     assert np.mean(u) == pytest.approx(np.std(b), rel=0.34)
+
+
+@pytest.mark.parametrize("tau", [0.065, 0.1])
+def test_the_stated_scatter_of_a_short_run_down_is_that_of_an_encoders_counts(tau: float) -> None:
+    """Over 60 lags of some 250 samples Newey and West's sum would state two thirds of it."""
+    rng, count, b, c = np.random.default_rng(7), 2 * np.pi / 4096, 1 / tau, 1.5
+    found = []
+    for _ in range(150):
+        start = rng.uniform(58, 62)
+        t = np.arange(0, (math.log(start + c / b) - math.log(3 + c / b)) / b, 1e-3)
+        angle = np.floor((fit.angle(t, b, c, start) + rng.uniform(0, count)) / count) * count
+        found.append(fit.of_angle(t, angle, SHORT_LAGS, SMALLEST_SAMPLES))
+    true = np.std([[x.b, x.c] for x in found], axis=0)
+    stated = np.sqrt(np.mean([np.diag(x.covariance) for x in found], axis=0))
+    np.testing.assert_allclose(stated, true, rtol=0.2)
+    assert np.abs(np.mean([[x.b - b, x.c - c] for x in found], axis=0)).max() < 4 * true.max() / math.sqrt(150)
 
 
 def test_a_ring_of_known_inertia_gives_the_inertia() -> None:
