@@ -56,6 +56,18 @@ def stated(rig: RigFile, key: str) -> Parameter:
     return rig.parameters[parameter(rig, key)]
 
 
+def chosen(rig: RigFile, kind: str, name: str) -> dict[str, float]:
+    """The parameters, by their names, that choose a setting of `[capabilities.settings]`.
+
+    Raises:
+        Lacking: the controller has none of that name.
+    """
+    known = rig.capabilities.settings.get(kind, {})
+    if name not in known:
+        raise Lacking(f"capabilities.settings.{kind}: found no {name}; it has {', '.join(known) or 'none'}")
+    return dict(known[name])
+
+
 def named(rig: RigFile, values: Mapping[str, float]) -> dict[str, float]:
     """Values by the names of the parameters.
 
