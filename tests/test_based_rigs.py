@@ -213,6 +213,19 @@ def test_a_base_that_cannot_be_is_refused(folder: Path, write: Callable[[Path], 
     assert said in str(caught.value)
 
 
+def test_bench_check_names_the_file_of_a_plan_and_of_what_is_simulated(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    base = folder / "tsbs12.toml"
+    base.write_text(base.read_text().replace("\nangles = 9\n", "\nangles = -9\n"))
+    rig = written(folder, "[plans.slew]\nperiods = -1\n[devices.controller]\ntick_s = 2e-4\n")
+    assert main(["check", rig]) == 2
+    said = capsys.readouterr().err
+    assert f"{rig} [plans.slew]: periods: found -1" in said
+    assert f"{base} [plans.amb-calibration]: angles: found -9" in said
+    assert f"{rig}: devices.controller.tick_s: found 0.0002 s" in said
+
+
 def test_the_map_of_messages_is_found_beside_the_base_and_named_with_it(folder: Path) -> None:
     rig = written(folder, "")
     assert load_rig(rig).dbc_text == load_rig(str(folder / "tsbs12.toml")).dbc_text
@@ -268,7 +281,8 @@ def test_the_example_of_the_page_is_a_rig(folder: Path) -> None:
     example = page.split("## Based on another file")[1].split("```toml\n")[1].split("```")[0]
     rig = load_rig(written(folder, example, ""))
     assert (rig.name, rig.uut.serial, rig.parameters["segment_max"].default) == ("tsbs12-b", "0002", 7.8)
-    assert ("temp_m" in rig.channels, list(rig.masses)) == (False, ["M1", "M2", "M3"])
+    assert ("temp_m" in rig.channels, list(rig.levers)) == (False, ["left"])
+    assert main(["check", rig.path]) == 0
 
 
 def test_a_calibration_of_the_base_is_of_another_rig(tmp_path: Path) -> None:

@@ -52,8 +52,14 @@ class Merged:
         return next((f for f in self.files if f in files), self.files[0])
 
     def attributed(self, problems: Iterable[Problem]) -> tuple[Problem, ...]:
-        """The problems, each with the file in which its key stands."""
-        return tuple(replace(p, file=self.file_of(p.key)) if p.file == self.files[0] else p for p in problems)
+        """The problems, each with the file in which its key stands. That of a plan has its table behind the file."""
+        return tuple(self._attributed(p) for p in problems)
+
+    def _attributed(self, p: Problem) -> Problem:
+        table = p.file.removeprefix(self.files[0])
+        if table and not (table != p.file and table.startswith(" [")):
+            return p
+        return replace(p, file=self.file_of(f"{table.strip(' []')}.{p.key}".strip(".")) + table)
 
 
 def read_merged(path: Path) -> Merged:
