@@ -97,7 +97,7 @@ def _estimates(
 ) -> dict[str, Estimate]:
     parts = [_of_group(g, plan, given) for g in groups]
     weights = [len(g) / sum(map(len, groups)) for g in groups]
-    spread = jackknife(lambda some: weighted([statistics(g, plan, p) for g in some], some), groups)
+    spread = jackknife(lambda some: statistics(some, plan, p), groups)
     out = {}
     for key in parts[0]:
         total = parts[0][key] * weights[0]
@@ -109,22 +109,21 @@ def _estimates(
     return out
 
 
-def weighted(found: Sequence[Numbers], groups: Sequence[Turns]) -> dict[str, float]:
-    """Means over groups by how many turns each has."""
+def jackknife(of: Callable[[Turns], Numbers], groups: Sequence[Turns]) -> dict[str, tuple[float, float]]:
+    """Standard uncertainty and degrees of freedom of each statistic, from turns without one of them each (Tukey), by groups: to
+    which side a repeat went is known and no scatter. A turn alone scatters as those of the other group do."""
     whole = sum(map(len, groups))
-    return {key: sum(f[key] * len(g) for f, g in zip(found, groups, strict=True)) / whole for key in found[0]}
-
-
-def jackknife(of: Callable[[list[Turns]], Numbers], groups: Sequence[Turns]) -> dict[str, tuple[float, float]]:
-    """Standard uncertainty and degrees of freedom of each statistic, from those without one turn each (Tukey)."""
-    found = []
-    for k, group in enumerate(groups):
-        for turn in range(len(group)):
-            left = [group.without(turn) if j == k else g for j, g in enumerate(groups)]
-            found.append(of([g for g in left if len(g)]))
-    n = len(found)
-    values = {key: np.array([f[key] for f in found]) for key in found[0]}
-    return {key: (math.sqrt((n - 1) / n * float(((x - x.mean()) ** 2).sum())), n - 1.0) for key, x in values.items()}
+    variances: list[dict[str, float]] = []
+    for group in (g for g in groups if len(g) > 1):
+        n = len(group)
+        found = [of(group.without(turn)) for turn in range(n)]
+        values = {key: np.array([f[key] for f in found]) for key in found[0]}
+        # of one turn, so that a mean over n of them has an n-th of it
+        variances.append({key: (n - 1) * float(((x - x.mean()) ** 2).sum()) for key, x in values.items()})
+    freedoms = [len(g) - 1 for g in groups if len(g) > 1]
+    dof = float(sum(freedoms))
+    pooled = {key: sum(v[key] * f for v, f in zip(variances, freedoms, strict=True)) / dof for key in variances[0]}
+    return {key: (math.sqrt(v / whole), dof) for key, v in pooled.items()}
 
 
 def statistics(t: Turns, plan: Plan, p: Numbers) -> dict[str, float]:

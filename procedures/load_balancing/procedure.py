@@ -105,10 +105,19 @@ def _around(rig: Rig, plan: Plan, record: Recorder, way: str, sign: int, repeat:
     with record.step(STEP, when=AFTER, way=way, repeat=repeat):
         rig.clock.sleep(turns_s)
     rig.capture.wait(5.0)
-    rig.levitation.write(chosen(rig.file, "load_balancing", "off"))
+    _field_back(rig, plan)
     write(rig, {"motor.circle": 0.0})
     rig.capture.upload(None, way=way, repeat=repeat)
     rig.clock.sleep(plan.radius_m / CIRCLE_M_S + 0.5)
+
+
+def _field_back(rig: Rig, plan: Plan) -> None:
+    """Back to a field that stands still. First gamma goes home while balancing still knows of it: the PID that takes over does
+    not, and would push by M gamma in the wrong direction, 64 degrees at the bound."""
+    write(rig, {"motor.phase_limit": 0.0})
+    rig.clock.sleep(plan.gamma_max_rad / plan.gamma_slew_rad_s + 0.1)
+    rig.levitation.write(chosen(rig.file, "load_balancing", "off"))
+    write(rig, {"motor.phase_limit": plan.gamma_max_rad})
 
 
 @dataclass(frozen=True)

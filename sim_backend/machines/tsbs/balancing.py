@@ -1,6 +1,8 @@
-"""Load balancing on a circle (T 6.7.3) without noise: what the drawn machine does, and what its own constants say it should.
+"""Load balancing on a circle (T 6.7.3): what the drawn machine does in the mean, and what its own constants say it should.
 
-The shaft stands at its home angle. The load on the motor is D, N, horizontal + j up; currents are those along the field.
+The machine runs with the noise of its position sensors: gamma follows a noisy load by a slew, and so lags behind more than
+without. Means over TURNS leave little of it. The shaft stands at its home angle. The load on the motor is D, N, horizontal + j
+up; currents are those along the field.
 """
 
 from __future__ import annotations
@@ -14,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.rigfile import RigFile
-from sim_backend.controller.controls import in_force
+from sim_backend.controller.controls import controls, in_force
 from sim_backend.core.plant import LEVITATE, LIFT, PERIOD_TICKS, READY, TICK_S
 from sim_backend.machine import Numbers, Truth
 from sim_backend.machines.tsbs.params import ControlParams, PlantParams
@@ -25,67 +27,102 @@ Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 AT = {name: k for k, name in enumerate(CHANNELS)}
 GAMMA = TRACE.index("gamma")
-MEAN = 10  # ms of which the currents' moving mean is taken
+MEAN = 10  # ms of which means are taken around the circle
+TURNS = 16
+NEAR, ORDERS = 8, 10  # means to either side of a peak, through which a parabola is laid; harmonics of the path
 FIXED = 4  # rounds for the direction of balanced currents, which sensors' zeros turn by a thousandth
-SLOTS = 4000  # of a turn of the circle, in which gamma follows by its slew
 
 
 def circle(rig: RigFile, drawn: Truth, asked: CircleAsked) -> Mapping[tuple[str, str], float]:
     """By quantity and place ("before" or "after", "" where it is neither's), true amperes and readings' metres."""
-    used = in_force(rig, drawn.machine, asked.settings)
+    quiet = replace(drawn.plant, current_noise=0.0, current_lsb=0.0)
+    found = {branch: _moved(rig, drawn, quiet, asked, branch) for branch in set(asked.branches)}
+    return {key: float(np.mean([found[b][key] for b in asked.branches])) for key in found[asked.branches[0]]}
+
+
+def _moved(
+    rig: RigFile, drawn: Truth, p: PlantParams, asked: CircleAsked, branch: int
+) -> dict[tuple[str, str], float]:
+    """What the machine does: a turn on the circle without balancing, one that is left out, one with it."""
+    plant, known = _levitated(rig, drawn, p, asked.settings), controls(rig, drawn.machine)
+
+    def write(values: Numbers) -> None:
+        for name, value in values.items():
+            for control in known[name]:
+                plant.set(control.name, control.of(value) * drawn.defects.get(f"factor_{name}", 1.0))
+
+    turn = round(1 / (abs(asked.hz) * TICK_S))
+    write(asked.carried)
+    plant.run(20000)
+    write(asked.circled)
+    plant.run(round(asked.ramp_s / TICK_S))
+    before = plant.run(TURNS * turn, PERIOD_TICKS)
+    plant.run(round((asked.engage_rad * math.copysign(1, asked.hz) / math.tau) % 1 * turn))
+    plant._s.law.balancing, plant._s.law.line = 1.0, branch * 1.2  # the side that the machine took
+    write(asked.balanced)
+    plant.run(turn)
+    after = plant.run(TURNS * turn, PERIOD_TICKS)
+    out: dict[tuple[str, str], float] = {}
+    for when, (rows, _) in (("before", before), ("after", after)):
+        x, y = (_mean(i) for i in _currents(p, rows))
+        off = _smooth(np.abs(_path(rows)) - asked.radius)
+        out |= {
+            ("peak_i_y", when): _top(np.abs(y)),
+            ("peak_any", when): max(_top(np.abs(y)), _top(np.abs(x))),
+            ("unbalance", when): unbalance(x, y),
+            ("error_radius", when): float(np.abs(off).max()),
+        }
+    control = ControlParams(**{f.name: plant.get(f.name) for f in fields(ControlParams)})
+    paths = (_path(before[0]), _path(after[0]))
+    return out | {
+        ("gamma_extreme", ""): min(_top(np.abs(_mean(after[1][:, GAMMA]))), asked.balanced_limit),
+        ("reduction", ""): out["peak_i_y", "after"] / out["peak_i_y", "before"] - 1,
+        ("unbalance_ratio", ""): out["unbalance", "after"] / out["unbalance", "before"],
+        ("predicted_reduction", ""): quasi_static(p, control, asked, branch, paths),
+    }
+
+
+def _levitated(rig: RigFile, drawn: Truth, p: PlantParams, settings: Numbers) -> Plant:
+    """With the controller's settings, lifted by the AMBs."""
+    used = in_force(rig, drawn.machine, settings)
     known = {f.name for f in fields(ControlParams)} & set(used)
     control = ControlParams(**{name: used[name] * drawn.defects.get(f"factor_{name}", 1.0) for name in known})
-    quiet = replace(drawn.plant, position_noise=0.0, current_noise=0.0, position_lsb=0.0, current_lsb=0.0)
-    found: list[dict[tuple[str, str], float]] = []
-    for branch in sorted(set(asked.branches)):
-        seen = _moved(quiet, control, asked, branch)
-        part = {**seen, ("predicted_reduction", ""): quasi_static(quiet, control, asked, branch)}
-        found += [part] * asked.branches.count(branch)
-    return {key: float(np.mean([f[key] for f in found])) for key in found[0]} if found else {}
-
-
-def _moved(p: PlantParams, control: ControlParams, asked: CircleAsked, branch: int) -> dict[tuple[str, str], float]:
-    """What the machine does: a turn on the circle without balancing, one that is left out, one with it."""
-    plant, turn = Plant(p, control=control), round(1 / (abs(asked.hz) * TICK_S))
+    plant = Plant(p, control=control)
     plant.mode = READY
     plant.run(1000)
     plant.mode = LIFT
     plant.run(round(1.1 * control.lift_time_s / TICK_S))
     plant.mode = LEVITATE
     plant.run(8000)
-    for name, value in asked.carried.items():
-        plant.set(name, value)
-    plant.run(20000)
-    for name, value in asked.circled.items():
-        plant.set(name, value)
-    plant.run(turn * math.ceil(asked.ramp_s * abs(asked.hz)))
-    before = plant.run(turn, PERIOD_TICKS)
-    plant.run(round((asked.engage_rad * math.copysign(1, asked.hz) / math.tau) % 1 * turn))
-    plant._s.law.balancing, plant._s.law.line = 1.0, branch * 1.2  # the branch that the machine took
-    for name, value in asked.balanced.items():
-        plant.set(name, value)
-    plant.run(turn)
-    after = plant.run(turn, PERIOD_TICKS)
-    out: dict[tuple[str, str], float] = {}
-    for when, (rows, trace) in (("before", before), ("after", after)):
-        x, y = _currents(p, rows)
-        off = np.abs(np.hypot(rows[:, AT["pos_xo"]], rows[:, AT["pos_yo"]]) - asked.radius)
-        out |= {
-            ("peak_i_y", when): float(_mean(np.abs(y)).max()),
-            ("peak_any", when): float(max(_mean(np.abs(y)).max(), _mean(np.abs(x)).max())),
-            ("unbalance", when): unbalance(_mean(x), _mean(y)),
-            ("error_radius", when): float(_mean(off).max()),
-        }
-        if when == "after":
-            out["gamma_extreme", ""] = float(np.abs(_mean(trace[:, GAMMA])).max())
-    out["reduction", ""] = out["peak_i_y", "after"] / out["peak_i_y", "before"] - 1
-    out["unbalance_ratio", ""] = out["unbalance", "after"] / out["unbalance", "before"]
-    return out
+    return plant
+
+
+def _path(rows: Array) -> Complex:
+    """Means of a turn, as the outboard sensors read."""
+    x, y = (_mean(rows[:, AT[name]]) for name in ("pos_xo", "pos_yo"))
+    return x + 1j * y
 
 
 def _mean(x: Array) -> Array:
-    """Moving mean over MEAN samples of a closed turn."""
-    return np.convolve(np.concatenate([x, x[: MEAN - 1]]), np.full(MEAN, 1 / MEAN), "valid")
+    """Of values each ms over TURNS: means over MEAN of them and over the turns."""
+    out: Array = x.reshape(TURNS, -1, MEAN).mean(axis=(0, 2))
+    return out
+
+
+def _top(x: Array) -> float:
+    """The greatest, by a parabola through those near it where it is a smooth top."""
+    k, s = int(np.argmax(x)), np.arange(-NEAR, NEAR + 1)
+    c2, c1, c0 = np.polyfit(s, np.take(x, k + s, mode="wrap"), 2)
+    smooth = c2 < 0 and abs(c1) <= -2 * c2 * NEAR
+    return float(c0 - c1**2 / (4 * c2)) if smooth else float(x[k])
+
+
+def _smooth(x: Array) -> Array:
+    """Its harmonics up to ORDERS."""
+    spectrum = np.fft.rfft(x)
+    spectrum[ORDERS + 1 :] = 0
+    out: Array = np.fft.irfft(spectrum, len(x))
+    return out
 
 
 def _currents(p: PlantParams, rows: Array) -> tuple[Array, Array]:
@@ -160,35 +197,35 @@ def load(p: PlantParams, control: ControlParams, sensed: Complex) -> Complex:
     return out
 
 
-def quasi_static(p: PlantParams, control: ControlParams, asked: CircleAsked, branch: int) -> float:
+def quasi_static(
+    p: PlantParams, control: ControlParams, asked: CircleAsked, branch: int, paths: tuple[Complex, Complex]
+) -> float:
     """Peak of |i_y| with balancing over that without, less 1, by the machine's own constants: T (6.27), (6.36), (6.37) with the
-    cut at gamma_max, the slew and the branch, and no dynamics."""
-    turn = np.arange(SLOTS) * math.tau / SLOTS * math.copysign(1, asked.hz)
-    d = load(p, control, asked.radius * np.exp(1j * turn))
+    cut at gamma_max, the slew and the side, and no dynamics. `paths` as the sensors read them, without and with it."""
     drive, poles = Drive.of(p), p.pole_pairs
     direct, cross = p.alpha_d - p.alpha_2, p.alpha_c + p.alpha_3
 
-    def held(gamma: Array) -> Complex:
+    def held(d: Complex, gamma: Array | float) -> Complex:
         """What the controller asks for, with the field at `gamma`."""
         angle = poles * (gamma - p.gamma_zero)
         return drive.asked(-d / (direct * np.cos(angle) + 1j * cross * np.sin(angle)))
 
-    goal = _equal(d, drive, branch, direct / cross) / poles + p.gamma_zero
+    before, after = (load(p, control, path) for path in paths)
+    goal = _equal(after, drive, branch, direct, cross) / poles + p.gamma_zero
     limit = asked.balanced_limit
     goal = np.clip((goal + math.pi / poles) % (2 * math.pi / poles) - math.pi / poles, -limit, limit)
-    gamma = _followed(goal, asked.slew / (abs(asked.hz) * SLOTS))
-    before = np.abs(drive.true(held(np.zeros(SLOTS))).imag).max()
-    return float(np.abs(drive.true(held(gamma)).imag).max() / before - 1)
+    gamma = _followed(goal, asked.slew / (abs(asked.hz) * len(goal)))
+    most = float(np.abs(drive.true(held(before, 0.0)).imag).max())
+    return float(np.abs(drive.true(held(after, gamma)).imag).max()) / most - 1
 
 
-def _equal(d: Complex, drive: Drive, branch: int, ratio: float) -> Array:
+def _equal(d: Complex, drive: Drive, branch: int, direct: float, cross: float) -> Array:
     """M (gamma - gamma_zero) at which |i_x| = |i_y| as the controller has them: i_y lifts, i_x has the sign of `branch`."""
-    size = np.abs(d) / np.abs(d).max() * 5.0
-    for _ in range(FIXED):  # A; the direction depends on the size only by the sensors' zeros
-        way = drive.acting(size * complex(branch, 1) / math.sqrt(2))
-        phi = np.angle(-d) - np.angle(way)
-        size = np.abs(d) / np.hypot(12.1 * np.cos(phi), 14.3 * np.sin(phi))
-    out: Array = np.arctan2(ratio * np.sin(phi), np.cos(phi))
+    size, out = np.abs(d) / direct, np.zeros(len(d))
+    for _ in range(FIXED):  # the direction depends on the size only by the sensors' zeros
+        phi = np.angle(-d) - np.angle(drive.acting(size * complex(branch, 1) / math.sqrt(2)))
+        out = np.arctan2(direct * np.sin(phi), cross * np.cos(phi))
+        size = np.abs(d) / np.hypot(direct * np.cos(out), cross * np.sin(out))
     return out
 
 
