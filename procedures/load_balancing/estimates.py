@@ -190,7 +190,8 @@ def _of_group(t: Turns, plan: Plan, given: Mapping[str, Estimate]) -> dict[str, 
         mean = read.mean(axis=0)
         out[f"peak_any/{when}"] = _greater(mean, pairs)
         out[f"unbalance/{when}"] = _share(mean, noise(fit.true(read, values)), pairs)
-        out[f"error_radius/{when}"] = Estimate.exact(found[f"error_radius/{when}"], "m")
+        scale = (1 / given["gain_xo"] + 1 / given["gain_yo"]) / 2
+        out[f"error_radius/{when}"] = scale * Estimate.exact(found[f"error_radius/{when}"], "m")
     out["unbalance_ratio"] = out["unbalance/after"] / out["unbalance/before"]
     told = Influence("resolution/gamma", "resolution of the capture", 1e-8 / math.sqrt(3), "rad", "B", "rectangular")
     out["gamma_extreme"] = Estimate.of(found["gamma_extreme"], told)

@@ -44,7 +44,7 @@ UNBALANCE = Quantity("unbalance", "1", "rms of |i_x| - |i_y| over rms of |i_x| +
 RATIO = Quantity("unbalance_ratio", "1", "unbalance with balancing over that without")
 GAMMA = Quantity("gamma_extreme", "rad", "greatest size of the phase angle while it balances")
 ERROR = Quantity(
-    "error_radius", "m", "greatest deviation of the path from its circle along the radius, as the probes read"
+    "error_radius", "m", "greatest deviation along the radius of the path from the circle that the probes should read"
 )
 MEASURES = (PEAK_Y, PEAK_ANY, REDUCTION, PREDICTED, UNBALANCE, RATIO, GAMMA, ERROR)
 CIRCLE_M_S = 1e-4  # how fast the controller changes the circle's radius

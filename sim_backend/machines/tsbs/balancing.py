@@ -28,7 +28,7 @@ Complex = npt.NDArray[np.complex128]
 AT = {name: k for k, name in enumerate(CHANNELS)}
 GAMMA = TRACE.index("gamma")
 MEAN = 10  # ms of which means are taken around the circle
-TURNS = 16
+TURNS = 32
 NEAR, ORDERS = 8, 10  # means to either side of a peak, through which a parabola is laid; harmonics of the path
 FIXED = 4  # rounds for the direction of balanced currents, which sensors' zeros turn by a thousandth
 
@@ -62,6 +62,7 @@ def _moved(
     write(asked.balanced)
     plant.run(turn)
     after = plant.run(TURNS * turn, PERIOD_TICKS)
+    scale = (1 / p.position_gain[2] + 1 / p.position_gain[3]) / 2
     out: dict[tuple[str, str], float] = {}
     for when, (rows, _) in (("before", before), ("after", after)):
         x, y = (_mean(i) for i in _currents(p, rows))
@@ -70,7 +71,7 @@ def _moved(
             ("peak_i_y", when): _top(np.abs(y)),
             ("peak_any", when): max(_top(np.abs(y)), _top(np.abs(x))),
             ("unbalance", when): unbalance(x, y),
-            ("error_radius", when): float(np.abs(off).max()),
+            ("error_radius", when): float(np.abs(off).max()) * scale,
         }
     control = ControlParams(**{f.name: plant.get(f.name) for f in fields(ControlParams)})
     paths = (_path(before[0]), _path(after[0]))
