@@ -35,6 +35,8 @@ class Turns:
     after: Complex
     path_before: Complex
     path_after: Complex
+    distance_before: Array
+    distance_after: Array
     gamma: Array
     law: Law
 
@@ -44,7 +46,8 @@ class Turns:
 
     @property
     def _arrays(self) -> tuple[npt.NDArray[np.complex128 | np.float64], ...]:
-        return self.before, self.after, self.path_before, self.path_after, self.gamma
+        return (self.before, self.after, self.path_before, self.path_after, self.distance_before, self.distance_after,
+                self.gamma)  # fmt: skip
 
     def __len__(self) -> int:
         return len(self.before)
@@ -87,8 +90,9 @@ def grouped(around: Sequence[Around], plan: Plan, way: str, sign: int) -> tuple[
             law = Law(sign * plan.circle_hz, plan.gamma_slew_rad_s, plan.gamma_max_rad, branch)
             before, after = (np.concatenate([mean_currents(x.segments) for x in of]) for of in zip(*mine, strict=True))
             paths = [np.concatenate([x.path for x in of]) for of in zip(*mine, strict=True)]
+            far = [np.concatenate([x.distance for x in of]) for of in zip(*mine, strict=True)]
             gamma = np.concatenate([a.gamma for _, a in mine if a.gamma is not None])
-            out.append(Turns(before, after, paths[0], paths[1], gamma, law))
+            out.append(Turns(before, after, *paths, *far, gamma, law))
     return tuple(out)
 
 
@@ -135,8 +139,8 @@ def statistics(t: Turns, plan: Plan, p: Numbers) -> dict[str, float]:
         out[f"unbalance/{when}"] = fit.share(i.real, i.imag, unsure)
         out[f"peak_any/{when}"] = max(fit.peak(np.abs(i.real)), fit.peak(np.abs(i.imag)))
     out["unbalance_ratio"] = out["unbalance/after"] / out["unbalance/before"]
-    out["error_radius/before"] = fit.off_circle(t.path_before.mean(axis=0), plan.radius_m)
-    out["error_radius/after"] = fit.off_circle(t.path_after.mean(axis=0), plan.radius_m)
+    out["error_radius/before"] = fit.off_circle(t.distance_before, plan.radius_m)
+    out["error_radius/after"] = fit.off_circle(t.distance_after, plan.radius_m)
     out["gamma_extreme"] = extreme(t.gamma.mean(axis=0), t.law.limit)
     return out
 

@@ -88,8 +88,8 @@ def _gamma(t: Turns, p: Mapping[str, float], plan: Plan, way: str) -> Figure:
 
 def _paths(t: Turns, plan: Plan, way: str) -> Figure:
     series = tuple(
-        Series(name, _angle(t), 1e6 * (np.abs(path.mean(axis=0)) - plan.radius_m))
-        for name, path in (("without", t.path_before), ("with", t.path_after))
+        Series(name, _angle(t), 1e6 * (far.mean(axis=0) - plan.radius_m))
+        for name, far in (("without", t.distance_before), ("with", t.distance_after))
     )
     return Figure("path", f"Path off its circle, {way}",
                   "Along the radius, as the outboard probes read it. Without balancing a PID follows the circle; with it the observer "

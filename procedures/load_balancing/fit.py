@@ -17,7 +17,8 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 NEAR = 0.02  # of a turn to either side of a peak, through which a parabola is laid
-ORDERS = 10  # harmonics of the circle that the deviation from it is looked at with
+AGAIN = 200  # draws of the turns
+ORDERS = 4  # harmonics of the circle that the deviation from it is looked at with
 Numbers = Mapping[str, float]
 
 
@@ -123,16 +124,23 @@ def peak(x: Array, at: int | None = None) -> float:
 
 
 def smooth(x: Array) -> Array:
-    """The harmonics up to ORDERS of values (bins,) around a circle."""
+    """The harmonics up to ORDERS of values (..., bins) around a circle."""
     spectrum = np.fft.rfft(x)
-    spectrum[ORDERS + 1 :] = 0
-    out: Array = np.fft.irfft(spectrum, len(x))
+    spectrum[..., ORDERS + 1 :] = 0
+    out: Array = np.fft.irfft(spectrum, x.shape[-1])
     return out
 
 
-def off_circle(path: Complex, radius: float) -> float:
-    """Greatest deviation of a path (bins,) from its circle, along the radius, m."""
-    return float(np.abs(smooth(np.abs(path) - radius)).max())
+def off_circle(distance: Array, radius: float) -> float:
+    """Greatest deviation of distances (turns, bins) in the mean from a circle's radius, m. The greatest of noisy values is
+    too large; by how much is seen in turns that are drawn from these again and again (Efron's bootstrap), and taken off."""
+    off = smooth(distance - radius)
+    found = float(np.abs(off.mean(axis=0)).max())
+    n = len(off)
+    if n < 2:
+        return found
+    drawn = np.random.default_rng(n).multinomial(n, np.full(n, 1 / n), AGAIN) / n
+    return 2 * found - float(np.abs(drawn @ off).max(axis=1).mean())
 
 
 def share(x: Array, y: Array, noise: tuple[float, float] = (0.0, 0.0)) -> float:

@@ -23,7 +23,8 @@ STEP, BEFORE, AFTER = "circle", "before", "after"
 @dataclass(frozen=True)
 class Around:
     """The turns of one step. By turn and by bins of the circle's phase: `segments` (turns, bins, 4) A as their sensors read,
-    `path` (turns, bins) m, horizontal + j up, at the outboard sensors; with balancing, from the capture, `gamma` (turns, bins)
+    `path` (turns, bins) m, horizontal + j up, at the outboard sensors, and its `distance` from their zero (a chord is nearer than
+    its arc, by 1 nm in 10 ms); with balancing, from the capture, `gamma` (turns, bins)
     rad, `observed` (turns, bins) N, the load as the controller has it, and `fastest` rad/s, of the phase angle. Then its
     flags ORed, what stood still, and lost samples."""
 
@@ -32,6 +33,7 @@ class Around:
     repeat: int
     segments: Array
     path: Complex
+    distance: Array
     gamma: Array | None
     observed: Complex | None
     fastest: float
@@ -96,7 +98,7 @@ def _read(recording: Recording[Plan], step: Step) -> Around:
     if len(data["t_ns"]) < 10 * plan.turns:
         raise AnalysisError(f"step {dict(labels)}: found {len(data['t_ns'])} samples")
     x, y = (data[c] for c in positions(machine))
-    read = (*(data[c] for c in machine.segments), x, y)
+    read = (*(data[c] for c in machine.segments), x, y, np.hypot(x, y))
     t = (data["t_ns"] - step.start_ns) * 1e-9
     zero = float(np.angle(((x + 1j * y) * np.exp(-2j * math.pi * hz * t)).mean()))
     folded = fold(t, np.array(read), zero, hz, plan, str(dict(labels)))
@@ -107,7 +109,7 @@ def _read(recording: Recording[Plan], step: Step) -> Around:
     flags = data[STATUS].astype(np.int64)
     return Around(
         str(labels["when"]), str(labels["way"]), int(labels["repeat"]), folded[..., :4], folded[..., 4] + 1j * folded[..., 5],
-        gamma, observed, fastest, int(np.bitwise_or.reduce(flags)),
+        folded[..., 6], gamma, observed, fastest, int(np.bitwise_or.reduce(flags)),
         tuple(c for c in (*positions(machine), *machine.segments) if np.ptp(data[c]) == 0), step.lost(), step.expected(),
     )  # fmt: skip
 

@@ -29,7 +29,7 @@ AT = {name: k for k, name in enumerate(CHANNELS)}
 GAMMA = TRACE.index("gamma")
 MEAN = 10  # ms of which means are taken around the circle
 TURNS = 32
-NEAR, ORDERS = 8, 10  # means to either side of a peak, through which a parabola is laid; harmonics of the path
+NEAR, ORDERS = 8, 4  # means to either side of a peak, through which a parabola is laid; harmonics of the path
 FIXED = 4  # rounds for the direction of balanced currents, which sensors' zeros turn by a thousandth
 
 
@@ -66,12 +66,11 @@ def _moved(
     out: dict[tuple[str, str], float] = {}
     for when, (rows, _) in (("before", before), ("after", after)):
         x, y = (_mean(i) for i in _currents(p, rows))
-        off = _smooth(np.abs(_path(rows)) - asked.radius)
         out |= {
             ("peak_i_y", when): _top(np.abs(y)),
             ("peak_any", when): max(_top(np.abs(y)), _top(np.abs(x))),
             ("unbalance", when): unbalance(x, y),
-            ("error_radius", when): float(np.abs(off).max()) * scale,
+            ("error_radius", when): _off_circle(rows, asked.radius) * scale,
         }
     control = ControlParams(**{f.name: plant.get(f.name) for f in fields(ControlParams)})
     paths = (_path(before[0]), _path(after[0]))
@@ -118,12 +117,11 @@ def _top(x: Array) -> float:
     return float(c0 - c1**2 / (4 * c2)) if smooth else float(x[k])
 
 
-def _smooth(x: Array) -> Array:
-    """Its harmonics up to ORDERS."""
-    spectrum = np.fft.rfft(x)
+def _off_circle(rows: Array, radius: float) -> float:
+    """Greatest deviation along the radius of the turns' mean, of its harmonics up to ORDERS."""
+    spectrum = np.fft.rfft(_mean(np.hypot(rows[:, AT["pos_xo"]], rows[:, AT["pos_yo"]]) - radius))
     spectrum[ORDERS + 1 :] = 0
-    out: Array = np.fft.irfft(spectrum, len(x))
-    return out
+    return float(np.abs(np.fft.irfft(spectrum, round(len(rows) / TURNS / MEAN))).max())
 
 
 def _currents(p: PlantParams, rows: Array) -> tuple[Array, Array]:
