@@ -15,6 +15,7 @@ from procedures.load_balancing.plan import Plan
 from procedures.load_balancing.steps import AFTER, BEFORE, Around, Complex, mean_currents, of_way
 from procedures.servomotor import checks
 from procedures.servomotor.conventions import Servomotor
+from procedures.shared.gradients import linearised
 
 FATAL = ("stuck-channel", "missing-turns")
 ALLOWED = 0.002  # of the reduction: what slew, delay and observer add to a quasi-static formula, see the page
@@ -22,6 +23,7 @@ SIDE_N = 3.0  # of constant horizontal load that decides the side; what the obse
 CHANGED = 0.01  # of the turn, and of |i_x| in the mean: readings near zero have either sign
 OBSERVED = 0.01  # by which its load may differ in size from that of the currents, and in direction, rad
 BEYOND = 1.02  # of what the phase angle was told: the capture is of single precision, its clock of 50 ppm
+SIZE, TURNED_RAD = 0.003, math.radians(0.2)  # of the load's change: what the torque current adds to it
 OFF_RAD = math.radians(0.06)  # of the phase angle, beside its U: slew and delay
 
 
@@ -37,8 +39,8 @@ def of_signals(around: Sequence[Around], machine: Servomotor, plan: Plan) -> Ite
     if share > plan.max_lost:
         yield Finding(
             "missing-samples",
-            f"{share:.2%} of the samples of a step are missing ({plan.max_lost:.2%} is allowed). Look at the link: load, cable, "
-            "gateway.", worst.where, Effect.INDETERMINATE,
+            f"{share:.2%} of the samples of a step are missing ({plan.max_lost:.2%} is allowed). Look at the link: load, "
+            "cable, gateway.", worst.where, Effect.INDETERMINATE,
         )  # fmt: skip
     for channel in sorted({c for a in around for c in a.stuck}):
         yield Finding(
@@ -59,12 +61,13 @@ def of_law(around: Sequence[Around], plan: Plan, model: Mapping[str, float], pol
         if other.mean() > CHANGED and float(np.abs(x[other]).sum()) > CHANGED * float(np.abs(x).sum()):
             yield Finding(
                 "side-changes",
-                f"i_x has the other sign on {other.mean():.0%} of the turn: the load's direction is not followed without a jump, "
-                "so that gamma passes zero under load (delta wrapped into two quadrants).", a.where, Effect.INDETERMINATE,
+                f"i_x has the other sign on {other.mean():.0%} of the turn: the load's direction is not followed without a "
+                "jump, so that gamma passes zero under load (delta wrapped into two quadrants).", a.where, Effect.INDETERMINATE,
             )  # fmt: skip
             break
-    furthest, fastest = max(float(np.abs(a.gamma).max()) for a in balanced if a.gamma is not None), max(
-        a.fastest for a in balanced
+    furthest, fastest = (
+        max(float(np.abs(a.gamma).max()) for a in balanced if a.gamma is not None),
+        max(a.fastest for a in balanced),
     )
     for found, told, what, unit in (
         (furthest, plan.gamma_max_rad, "goes to", "°"), (fastest, plan.gamma_slew_rad_s, "turns by up to", "°/s")
@@ -76,10 +79,11 @@ def of_law(around: Sequence[Around], plan: Plan, model: Mapping[str, float], pol
 
 
 def _observed(balanced: Sequence[Around], model: Mapping[str, float], poles: float) -> Iterator[Finding]:
-    """The observer's load over -alpha_eff e^(j phi) i, by the model that the controller was told: one, whatever the machine is."""
+    """The observer's load over -alpha_eff e^(j phi) i, by the model that the controller was told: 1 on any machine."""
     ratio = 0j
     for a in balanced:
-        assert a.gamma is not None and a.observed is not None
+        assert a.gamma is not None
+        assert a.observed is not None
         angle = poles * a.gamma.mean(axis=0)
         eff = model["alpha_d"] * np.cos(angle) + 1j * model["alpha_c"] * np.sin(angle)
         own: Complex = -eff * mean_currents(a.segments.mean(axis=0))
@@ -90,8 +94,8 @@ def _observed(balanced: Sequence[Around], model: Mapping[str, float], poles: flo
         yield Finding(
             "observer-differs",
             f"the controller has a load {off:+.1%} of that which its currents and its model of the motor give, turned by "
-            f"{math.degrees(float(np.angle(ratio))):+.1f}°: its constants are not those it was told, or it does not know what its "
-            "currents are.", "observer", Effect.INDETERMINATE,
+            f"{math.degrees(float(np.angle(ratio))):+.1f}°: its constants are not those it was told, or it does not "
+            "know what its currents are.", "observer", Effect.INDETERMINATE,
         )  # fmt: skip
 
 
@@ -107,8 +111,8 @@ def of_side(results: Mapping[str, Result], plan: Plan, model: Mapping[str, float
             if abs(across) > SIDE_N and (across > 0) != (group.law.branch < 0):
                 yield Finding(
                     "balancing-branch",
-                    f"the constant load as the controller had it when balancing began was {across:+.1f} N across; gamma followed "
-                    "the load to the other side than that.", result.way, Effect.INDETERMINATE,
+                    f"the constant load as the controller had it when balancing began was {across:+.1f} N across; "
+                    "gamma followed the load to the other side than that.", result.way, Effect.INDETERMINATE,
                 )  # fmt: skip
 
 
@@ -116,17 +120,17 @@ def constant_across(t: Turns, plan: Plan, model: Mapping[str, float]) -> float:
     """Horizontal part in N of what the controller takes for constant in the load, at the phase at which balancing begins: minus
     alpha_d i less its stiffness times the position, by its own model."""
     path, current = t.path_before.mean(axis=0), t.before.mean(axis=0)
-    at = int(round(plan.engage_rad / (2 * math.pi) * len(path))) % len(path)
+    at = round(plan.engage_rad / (2 * math.pi) * len(path)) % len(path)
     near = np.take(current, at + np.arange(-3, 4), mode="wrap").mean()
     return float((-model["alpha_d"] * near - model["stiffness"] * path[at]).real)
 
 
-def of_results(results: Mapping[str, Result], given: Mapping[str, Estimate], plan: Plan) -> Iterator[Finding]:
+def of_results(results: Mapping[str, Result], given: Mapping[str, Estimate]) -> Iterator[Finding]:
     """Measured against predicted: reduction, phase angle, stiffness."""
     for way, result in results.items():
         yield from _reduction(way, result)
         yield from _gamma(way, result, given)
-        yield from _stiffness(way, result, given, plan)
+        yield from _stiffness(way, result, given)
 
 
 def _reduction(way: str, result: Result) -> Iterator[Finding]:
@@ -138,8 +142,8 @@ def _reduction(way: str, result: Result) -> Iterator[Finding]:
             yield Finding(
                 "not-as-predicted",
                 f"the largest i_y changes by {measured.value:+.1%}, and by the quasi-static formula {source} by "
-                f"{measured.value - apart.value:+.1%}: {abs(apart.value) * 100:.2f} points apart, {allowed * 100:.2f} allowed. Look "
-                "at how gamma is led, and at whether the adopted constants are this machine's.", way, Effect.INDETERMINATE,
+                f"{measured.value - apart.value:+.1%}: {abs(apart.value) * 100:.2f} points apart, {allowed * 100:.2f} allowed. "
+                "Look at how gamma is led, and at whether the adopted constants are this machine's.", way, Effect.INDETERMINATE,
             )  # fmt: skip
             return
 
@@ -153,8 +157,8 @@ def _gamma(way: str, result: Result, given: Mapping[str, Estimate]) -> Iterator[
     if abs(off) > allowed or rms > 10 * OFF_RAD:
         yield Finding(
             "gamma-differs",
-            f"gamma stands {math.degrees(off):+.3f}° (rms {math.degrees(rms):.3f}°) off the angle at which the load by the adopted "
-            f"constants is balanced ({math.degrees(allowed):.3f}° allowed). Has the encoder's zero moved since force-coupling?",
+            f"gamma stands {math.degrees(off):+.3f}° (rms {math.degrees(rms):.3f}°) off the angle at which the load by the "
+            f"adopted constants is balanced ({math.degrees(allowed):.3f}° allowed): its bound, its slew or its law is another.",
             way, Effect.INDETERMINATE,
         )  # fmt: skip
 
@@ -170,25 +174,38 @@ def gamma_off(t: Turns, p: Mapping[str, float]) -> tuple[float, float, float]:
     return float(off.mean()), float(free.mean()), float(np.sqrt((off**2).mean()))
 
 
-def _stiffness(way: str, result: Result, given: Mapping[str, Estimate], plan: Plan) -> Iterator[Finding]:
-    """How the load changes along the circle, over the adopted stiffness."""
-    from procedures.shared.gradients import linearised
+def _stiffness(way: str, result: Result, given: Mapping[str, Estimate]) -> Iterator[Finding]:
+    """How the load changes along the circle, over the adopted stiffness: in size, and in direction. The magnets pull the way in
+    which the shaft is moved; a load that is turned against the path has its field turned by another gamma_0."""
 
-    ratio = linearised(lambda p: {"ratio": stiffness_ratio(result.main, p)}, given)["ratio"]
-    if abs(ratio.value - 1) > 3 * ratio.u + 0.003:
+    def model(p: dict[str, float]) -> dict[str, float]:
+        ratio = along_circle(result.main, p)
+        return {"size": abs(ratio), "angle": math.atan2(ratio.imag, ratio.real)}
+
+    found = linearised(model, given)
+    size, angle = found["size"], found["angle"]
+    if abs(size.value - 1) > 3 * size.u + SIZE:
         yield Finding(
             "stiffness-differs",
-            f"along the circle the load changes {ratio.value:.3f} times as much as the adopted stiffness has it (± {2 * ratio.u:.3f}): "
-            "a constant, a probe's gain or a current sensor's is not what it was when they were adopted.", way,
-            Effect.INDETERMINATE,
+            f"along the circle the load changes {size.value:.3f} times as much as the adopted stiffness has it "
+            f"(± {2 * size.u:.3f}): a constant, a probe's gain or a current sensor's is not what it was when they "
+            "were adopted.", way, Effect.INDETERMINATE,
+        )  # fmt: skip
+    allowed = 3 * angle.u + TURNED_RAD
+    if abs(angle.value) > allowed:
+        yield Finding(
+            "load-turned",
+            f"along the circle the load changes in a direction that is turned by {math.degrees(angle.value):+.2f}° against the "
+            f"path ({math.degrees(allowed):.2f}° allowed): the field is not where gamma_0 has it. Has the encoder's zero moved "
+            "since force-coupling?", way, Effect.INDETERMINATE,
         )  # fmt: skip
 
 
-def stiffness_ratio(t: Turns, p: Mapping[str, float]) -> float:
+def along_circle(t: Turns, p: Mapping[str, float]) -> complex:
     """The load's first harmonic over k times the path's."""
     load = fit.load(t.before.mean(axis=0), 0.0, p)
     k = p["alpha_x_prime"] * inputs.of_amb_plane(*(p[key] for key in inputs.LENGTHS))
     path = t.path_before.mean(axis=0)
     true = path.real / p["gain_xo"] + 1j * path.imag / p["gain_yo"]
     own = true - true.mean()
-    return float(((load - load.mean()) * own.conj()).sum().real / (k * np.abs(own) ** 2).sum())
+    return complex(((load - load.mean()) * own.conj()).sum() / (k * np.abs(own) ** 2).sum())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -42,12 +42,8 @@ class Turns:
 
     def without(self, turn: int) -> Turns:
         """All but one."""
-        return Turns(*(np.delete(x, turn, axis=0) for x in self._arrays), self.law)
-
-    @property
-    def _arrays(self) -> tuple[npt.NDArray[np.complex128 | np.float64], ...]:
-        return (self.before, self.after, self.path_before, self.path_after, self.distance_before, self.distance_after,
-                self.gamma)  # fmt: skip
+        arrays = {f.name: np.delete(getattr(self, f.name), turn, axis=0) for f in fields(self) if f.name != "law"}
+        return replace(self, **arrays)
 
     def __len__(self) -> int:
         return len(self.before)
@@ -92,7 +88,7 @@ def grouped(around: Sequence[Around], plan: Plan, way: str, sign: int) -> tuple[
             paths = [np.concatenate([x.path for x in of]) for of in zip(*mine, strict=True)]
             far = [np.concatenate([x.distance for x in of]) for of in zip(*mine, strict=True)]
             gamma = np.concatenate([a.gamma for _, a in mine if a.gamma is not None])
-            out.append(Turns(before, after, *paths, *far, gamma, law))
+            out.append(Turns(before, after, paths[0], paths[1], far[0], far[1], gamma, law))
     return tuple(out)
 
 
@@ -124,6 +120,11 @@ def jackknife(of: Callable[[Turns], Numbers], groups: Sequence[Turns]) -> dict[s
         values = {key: np.array([f[key] for f in found]) for key in found[0]}
         # of one turn, so that a mean over n of them has an n-th of it
         variances.append({key: (n - 1) * float(((x - x.mean()) ** 2).sum()) for key, x in values.items()})
+    if not variances:  # one turn to each side: what tells them apart is all there is
+        alone = [of(g) for g in groups]
+        return {
+            key: (float(np.std([f[key] for f in alone], ddof=1)) / math.sqrt(whole), whole - 1.0) for key in alone[0]
+        }
     freedoms = [len(g) - 1 for g in groups if len(g) > 1]
     dof = float(sum(freedoms))
     pooled = {key: sum(v[key] * f for v, f in zip(variances, freedoms, strict=True)) / dof for key in variances[0]}
@@ -163,7 +164,8 @@ def loads_of(t: Turns, p: Numbers) -> dict[str, tuple[Complex, Complex]]:
     changed of them; or constant as these show, and with the path as the adopted stiffness has it."""
     k = p["alpha_x_prime"] * inputs.of_amb_plane(*(p[key] for key in inputs.LENGTHS))
     before, after = (
-        x.real / p["gain_xo"] + 1j * x.imag / p["gain_yo"] for x in (t.path_before.mean(axis=0), t.path_after.mean(axis=0))
+        x.real / p["gain_xo"] + 1j * x.imag / p["gain_yo"]
+        for x in (t.path_before.mean(axis=0), t.path_after.mean(axis=0))
     )
     seen = fit.load(t.before.mean(axis=0), 0.0, p)
     constant = seen.mean() - k * before.mean()
@@ -234,8 +236,8 @@ def _greater(mean: Complex, pairs: Sequence[Estimate]) -> Estimate:
 
 
 def _share(mean: Complex, unsure: tuple[float, float], pairs: Sequence[Estimate]) -> Estimate:
-    """Unbalance of means (bins,), readings: rms of |a_x i_x - b_x| - |a_y i_y - b_y| over that of the sum. Both are quadratic in
-    the sensors' factors and zeros, and their expectations are the value."""
+    """Unbalance of means (bins,), readings: rms of |a_x i_x - b_x| - |a_y i_y - b_y| over that of the sum. Both are quadratic
+    in the sensors' factors and zeros, and their expectations are the value."""
     sx, sy = np.sign(mean.real), np.sign(mean.imag)
     x, y = np.array([np.abs(mean.real), -sx]), np.array([np.abs(mean.imag), -sy])
     forms = [np.concatenate([x, way * y]) for way in (-1.0, 1.0)]

@@ -25,7 +25,8 @@ def all_figures(results: Mapping[str, Result], plan: Plan) -> Iterator[Figure]:
 
 
 def _angle(t: Turns) -> Array:
-    return (np.arange(t.before.shape[1]) + 0.5) * 360 / t.before.shape[1]
+    out: Array = (np.arange(t.before.shape[1]) + 0.5) * 360 / t.before.shape[1]
+    return out
 
 
 def _vectors(t: Turns, p: Mapping[str, float], way: str) -> Figure:
@@ -44,9 +45,9 @@ def _vectors(t: Turns, p: Mapping[str, float], way: str) -> Figure:
         Series("|x| = |y|", side * equal, -equal, "guide"),
     ]
     return Figure("loads", f"Load on the motor around the circle, {way}",
-                  "In the frame of the motor's field: what i_x and i_y have to hold. Without balancing the field stands still and "
-                  "i_y carries nearly everything; with it the field turns so that both carry alike, on the dashed line. Where the "
-                  "bound of gamma is reached the vector leaves it.",
+                  "In the frame of the motor's field: what i_x and i_y have to hold. Without balancing the field stands still "
+                  "and i_y carries nearly everything; with it the field turns so that both carry alike, on the dashed line. "
+                  "Where the bound of gamma is reached the vector leaves it.",
                   "load across (N)", "load along (N)", tuple(series), kind="plane")  # fmt: skip
 
 
@@ -68,9 +69,10 @@ def _currents(t: Turns, p: Mapping[str, float], way: str) -> Figure:
         Series("|i_y| with, predicted", angle, np.abs(predicted.imag), "guide"),
     )
     return Figure("currents", f"Currents around the circle, {way}",
-                  "Means over the turns, as the segments' sensors read them. The largest i_y is what the amplifiers must be made for; "
-                  "the dashed one is the quasi-static formula on the loads without balancing.", "phase of the circle (°)",
-                  "current (A)", series, lines=(("largest without", top), ("largest with", float(np.abs(after.imag).max()))))  # fmt: skip
+                  "Means over the turns. The largest i_y is what the amplifiers must be made for; "
+                  "the dashed one is the quasi-static formula on the loads without balancing.",
+                  "phase of the circle (°)", "current (A)", series,
+                  lines=(("largest without", top), ("largest with", float(np.abs(after.imag).max()))))  # fmt: skip
 
 
 def _gamma(t: Turns, p: Mapping[str, float], plan: Plan, way: str) -> Figure:
@@ -81,9 +83,9 @@ def _gamma(t: Turns, p: Mapping[str, float], plan: Plan, way: str) -> Figure:
         Series("predicted", _angle(t), np.degrees(predicted), "guide"),
     )
     return Figure("gamma", f"Phase angle around the circle, {way}",
-                  "Where the controller turned the field, and where the load by the adopted constants puts it. At 90° over the pole "
-                  "pairs the motor gives no torque; the bound keeps away from that.", "phase of the circle (°)", "gamma (°)",
-                  series, lines=(("bound", bound), ("bound, negative", -bound)))  # fmt: skip
+                  "Where the controller turned the field, and where the load by the adopted constants puts it. At 90° over the "
+                  "pole pairs the motor gives no torque; the bound keeps away from that.", "phase of the circle (°)",
+                  "gamma (°)", series, lines=(("bound", bound), ("bound, negative", -bound)))  # fmt: skip
 
 
 def _paths(t: Turns, plan: Plan, way: str) -> Figure:
@@ -92,5 +94,5 @@ def _paths(t: Turns, plan: Plan, way: str) -> Figure:
         for name, far in (("without", t.distance_before), ("with", t.distance_after))
     )
     return Figure("path", f"Path off its circle, {way}",
-                  "Along the radius, as the outboard probes read it. Without balancing a PID follows the circle; with it the observer "
-                  "tells the load beforehand.", "phase of the circle (°)", "off the circle (µm)", series)  # fmt: skip
+                  "Along the radius, as the outboard probes read it. Without balancing a PID follows the circle; with it the "
+                  "observer tells the load beforehand.", "phase of the circle (°)", "off the circle (µm)", series)  # fmt: skip

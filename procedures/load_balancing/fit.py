@@ -1,8 +1,8 @@
 """The bare model: currents and loads of the motor around a circle, and what balancing makes of them; arrays in, arrays out.
 
 Complex numbers are horizontal + j up; currents are those along the field. T (6.5) for currents w = chi i_x + j i_y that act,
-with the field turned by gamma: F = alpha_d (cos M g + j/r sin M g) w, g = gamma - gamma_0, r = alpha_d/alpha_c. So phi of T (6.27)
-turns and alpha_eff scales them, and nothing else is in T (6.28).
+with the field turned by gamma: F = alpha_d (cos M g + j/r sin M g) w, g = gamma - gamma_0, r = alpha_d/alpha_c. So phi of T
+(6.27) turns and alpha_eff scales them, and nothing else is in T (6.28).
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ Numbers = Mapping[str, float]
 
 @dataclass(frozen=True)
 class Law:
-    """How the phase angle is led: turns of the circle in a second (negative: backwards), its slew rad/s, its bound rad, the sign
-    of i_x as against that of i_y."""
+    """How the phase angle is led: turns of the circle in a second (negative: backwards), its slew rad/s, its bound rad, the
+    sign of i_x as against that of i_y."""
 
     hz: float
     slew: float

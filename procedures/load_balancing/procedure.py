@@ -52,7 +52,9 @@ RATE_HZ = 1000.0  # of the capture
 NEEDED = ("motor.share", "motor.share_slew", "motor.segment_limit", "motor.ramp", "motor.phase", "motor.phase_slew",
           "motor.phase_limit", "motor.circle", "motor.circle_hz", "angle.ref")  # fmt: skip
 REVERSED = math.pi / 2  # electrical: beyond it the motor's torque is reversed
-KEPT = math.radians(10)  # electrical, kept from it: one degree of gamma for the commutation's zero, a quarter for the rest
+KEPT = math.radians(
+    10
+)  # electrical, kept from it: one degree of gamma for the commutation's zero, a quarter for the rest
 
 
 def settings(rig: RigFile, _: Plan) -> dict[str, float]:
@@ -137,7 +139,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     model = inputs.told(rig, plan, recording.calibrations)
     findings.add(checks.of_law(around, plan, model, rig.machine["pole_pairs"].value))
     findings.add(checks.of_side(results, plan, model))
-    findings.add(checks.of_results(results, given, plan))
+    findings.add(checks.of_results(results, given))
     return Analysis(results)
 
 
@@ -159,7 +161,10 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     if len(set(plan.ways)) < len(plan.ways):
         yield f"ways: found {', '.join(plan.ways)}; expected each once"
     room = carrying.MARGIN * rig.envelope.max_levitated_position_m
-    for limit, what in ((room, f"{carrying.MARGIN:.0%} of the envelope"), (stated(rig, "motor.circle").high, "the parameter")):
+    for limit, what in (
+        (room, f"{carrying.MARGIN:.0%} of the envelope"),
+        (stated(rig, "motor.circle").high, "the parameter"),
+    ):
         if plan.radius_m > limit:
             yield f"radius_m: found {plan.radius_m * 1e6:.0f} µm; {what} allows {limit * 1e6:.0f} µm"  # fmt: skip
     g = rig.geometry

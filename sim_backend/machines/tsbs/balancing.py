@@ -40,9 +40,7 @@ def circle(rig: RigFile, drawn: Truth, asked: CircleAsked) -> Mapping[tuple[str,
     return {key: float(np.mean([found[b][key] for b in asked.branches])) for key in found[asked.branches[0]]}
 
 
-def _moved(
-    rig: RigFile, drawn: Truth, p: PlantParams, asked: CircleAsked, branch: int
-) -> dict[tuple[str, str], float]:
+def _moved(rig: RigFile, drawn: Truth, p: PlantParams, asked: CircleAsked, branch: int) -> dict[tuple[str, str], float]:
     """What the machine does: a turn on the circle without balancing, one that is left out, one with it."""
     plant, known = _levitated(rig, drawn, p, asked.settings), controls(rig, drawn.machine)
 
@@ -222,7 +220,7 @@ def _equal(d: Complex, drive: Drive, branch: int, direct: float, cross: float) -
     """M (gamma - gamma_zero) at which |i_x| = |i_y| as the controller has them: i_y lifts, i_x has the sign of `branch`."""
     size, out = np.abs(d) / direct, np.zeros(len(d))
     for _ in range(FIXED):  # the direction depends on the size only by the sensors' zeros
-        phi = np.angle(-d) - np.angle(drive.acting(size * complex(branch, 1) / math.sqrt(2)))
+        phi = np.angle(-d) - np.angle(drive.acting(np.asarray(size * complex(branch, 1) / math.sqrt(2), np.complex128)))
         out = np.arctan2(direct * np.sin(phi), cross * np.cos(phi))
         size = np.abs(d) / np.hypot(direct * np.cos(out), cross * np.sin(out))
     return out
