@@ -76,9 +76,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Step to and fro for every case; with the outboard AMB in charge again in the end."""
     if not wiring.sound(rig, record):
         return
-    gains = {"angle.kd": plan.kd_theta, "angle.kp": plan.kp_theta, "angle.ki": plan.ki_theta}
-    slew = stated(rig.file, "angle.slew")
-    write(rig, {**gains, "angle.derivative_on_error": 1.0, "angle.slew": slew.high})
+    write(rig, carried(rig.file, plan))
     carrying.carry(rig, plan.settle_s)
     number = 0
     for case in planned(plan):
@@ -98,7 +96,13 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
                 rig.capture.upload(None, number=number)
             number += 1
     carrying.give_back(rig, 0.2)
-    write(rig, {"angle.slew": slew.default})
+    write(rig, {"angle.slew": stated(rig.file, "angle.slew").default})
+
+
+def carried(rig: RigFile, plan: Plan) -> dict[str, float]:
+    """What the controller is told before the motor carries, by meaning."""
+    gains = {"angle.kd": plan.kd_theta, "angle.kp": plan.kp_theta, "angle.ki": plan.ki_theta}
+    return {**gains, "angle.derivative_on_error": 1.0, "angle.slew": stated(rig, "angle.slew").high}
 
 
 def _numbered(rig: RigFile, number: int) -> dict[str, int]:
