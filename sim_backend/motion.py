@@ -85,7 +85,7 @@ class CompareAsked:
 
 @dataclass(frozen=True)
 class AngleCase:
-    """Steps of one size, rad: the `settings` written before them, the band of settling, rad, and whether the law has a bound."""
+    """Steps of one size, rad: the `settings` written before them, the band of settling, rad, and if the law has a bound."""
 
     settings: Numbers
     size: float

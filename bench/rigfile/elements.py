@@ -172,7 +172,7 @@ class Lever(Part):
 class Motor(Part):
     """What gives torque, and perhaps force. `currents` are the channels of its segments or phases, the first at `direction`:
     of each segment in turn the `components` of its current, q along the field and d across it. `asked`: what its controller can
-    record of the currents that its law asks for, which give force along the first segment and across it (a right angle clockwise)
+    record of the currents that its law asks for, which give force along the first segment, across it (a right angle clockwise),
     and torque."""
 
     kind: str

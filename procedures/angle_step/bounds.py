@@ -1,11 +1,11 @@
-"""Currents at the controller's full rate during a step: whether torque stays within what force leaves, and no segment beyond I_s.
+"""Currents at the controller's full rate during a step: whether torque stays within what force leaves, and segments within I_s.
 
 Of a motor whose segments carry vectors, q along the field and d across it, force asks i_x, i_y and T (7.18), put right, leaves
 
     |i_theta| <= max(0, sqrt(I_s^2 - i_x^2) - |i_y|)
 
-after i_x, i_y have been scaled into the circle I_s. Means over a millisecond would not do: a bound that steps reads as an ampere
-of excess. The capture begins just before the reference is written and lasts as long as the currents swing.
+after i_x, i_y have been scaled into the circle I_s. Means over a millisecond would not do: a bound that steps reads as an
+ampere of excess. The capture begins just before the reference is written and lasts as long as the currents swing.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def bound(i_x: Array, i_y: Array, limit: float) -> Array:
 
 
 def captured(rig: RigFile) -> tuple[str, ...]:
-    """What is captured of a step: nothing where currents are amplitudes, or the controller does not record what its law asks for."""
+    """What is captured of a step: nothing where currents are amplitudes, or what the law asks for is not recorded."""
     machine = conventions(rig)
     names = (*machine.segments, *(machine.asked[key] for key in ASKED if key in machine.asked))
     whole = machine.components == 2 and all(key in machine.asked for key in ASKED)
@@ -102,13 +102,13 @@ class Largest:
 
 
 def largest(swing: Swing, offsets: Array, gains: Array, noise: float) -> Largest:
-    """By true currents: `offsets` (k, 2) A and `gains` (k, 2) of the sensors. Samples are taken as they are: the derivative of an
-    encoder's counts makes currents jump from tick to tick. The largest of n alike exceeds them by their `noise`, A, times
+    """By true currents: `offsets` (k, 2) A and `gains` (k, 2) of the sensors. Samples are taken as they are: the derivative of
+    an encoder's counts makes currents jump from tick to tick. The largest of n alike exceeds them by their `noise`, A, times
     sqrt(2 ln n) at most."""
     true = (swing.vectors - offsets[:, :, None]) / gains[:, :, None]
     size = np.hypot(true[:, 0], true[:, 1])
     segment, at = (int(k) for k in np.unravel_index(int(np.argmax(size)), size.shape))
-    near = int((size > size.max() - 3 * noise).sum())
+    near = int((size >= size.max() - 3 * noise).sum())
     return Largest(float(size[segment, at]), true[segment, :, at], segment, noise * math.sqrt(2 * math.log(near)))
 
 

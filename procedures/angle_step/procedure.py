@@ -63,7 +63,10 @@ def settings(rig: RigFile, _: Plan) -> dict[str, float]:
 
 def planned(plan: Plan) -> list[Case]:
     """What is compared, in its order."""
-    sizes = {a: plan.steps_static_rad if a == "static" and plan.steps_static_rad else plan.steps_rad for a in plan.allocations}
+    sizes: dict[str, tuple[float, ...]] = {
+        a: plan.steps_static_rad if a == "static" and plan.steps_static_rad else plan.steps_rad
+        for a in plan.allocations
+    }
     return list(cases(sizes, plan.filters_hz))
 
 

@@ -48,8 +48,8 @@ class Case:
 
 @dataclass(frozen=True)
 class Done:
-    """One recorded move: its case, the move, its flags ORed, the channels that stood still, lost samples, and what was captured of
-    its currents, if anything was."""
+    """One recorded move: its case, the move, its flags ORed, the channels that stood still, lost samples, and what was captured
+    of its currents, if anything was."""
 
     case: Case
     move: Move

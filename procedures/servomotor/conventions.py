@@ -28,10 +28,11 @@ Value = TypeVar("Value", float, Array)
 @dataclass(frozen=True)
 class Servomotor:
     """Signals by axis: "x" or, upwards, "y" with the bearing, inboard "i" or outboard "o". `coils` has of each axis the one
-    that pulls towards the positive end first. `segments` are the motor's currents: four amplitudes in the order of T (6.9), or q and d of
-    the first half and of the second one, where it has two segments (T 7); `direction` rad is where its first one pushes.
-    `asked`: what a capture calls the currents that the law asks for, "along", "across" and "torque". `sensors` and `ambs` are the inboard and
-    the outboard lever from the centre of mass, by their names in the rig file's geometry. Then the flags by what they mean."""
+    that pulls towards the positive end first. `segments` are the motor's currents: four amplitudes in the order of T (6.9), or
+    q and d of each half, where it has two segments (T 7), and `components` how many each segment has; `direction` rad is where
+    its first one pushes. `asked`: what a capture calls the currents that the law asks for, "along", "across" and "torque".
+    `sensors` and `ambs` are the inboard and the outboard lever from the centre of mass, by their names in the rig file's
+    geometry. Then the flags by what they mean."""
 
     positions: Mapping[str, str]
     coils: Mapping[str, tuple[str, str]]
@@ -136,7 +137,12 @@ def _motor(rig: RigFile) -> dict[str, Any]:
         return {"segments": (), "components": 1, "direction": 0.0, "asked": {}}
     motor, at = rig.motors[name], f"motors/{name}"
     direction = Places(rig).direction(at).value if motor.direction is not None else 0.0
-    return {"segments": motor.currents, "components": len(motor.components), "direction": direction, "asked": motor.asked}
+    return {
+        "segments": motor.currents,
+        "components": len(motor.components),
+        "direction": direction,
+        "asked": motor.asked,
+    }
 
 
 def _of(plane: Support, end: str) -> Iterator[tuple[str, SupportedAxis]]:
@@ -157,6 +163,6 @@ def displacement(inboard: Array, outboard: Array, share: float) -> Array:
 
 
 def radial_currents(one: Array, two: Array, three: Array, four: Array) -> tuple[Array, Array]:
-    """i_x, i_y in A by the currents of the four segments (T 6.18), or by q1, d1, q2, d2 of two (T 7.11, 7.12): i_x = (d2 - d1)/2,
-    i_y = (q1 - q2)/2."""
+    """i_x, i_y in A by the currents of the four segments (T 6.18), or by q1, d1, q2, d2 of two (T 7.11, 7.12): i_x is
+    (d2 - d1)/2, i_y is (q1 - q2)/2."""
     return (four - two) / 2, (one - three) / 2

@@ -19,8 +19,8 @@ MOVED_RAD = 0.03
 
 @dataclass(frozen=True)
 class Movement:
-    """How far the rotor turned in rad, `towards` its reference or, negative, away from it; by which largest torque current in A,
-    and the work of the current on it in A rad."""
+    """How far the rotor turned in rad, `towards` its reference or, negative, away from it; by which largest torque current in
+    A, and the work of the current on it in A rad."""
 
     turned: float
     towards: float

@@ -55,9 +55,10 @@ def _segments(answers: dict[str, Array], machine: Servomotor) -> Iterator[Findin
         k = int(np.argmax(np.abs(error)))
         yield Finding(
             "segment-sign",
-            f"with 1 A of {name}, {_told(machine, k)} reads {answer[k]:+.2f} A where {_law(machine)} gives {EXPECTED[name][k]:+.0f} A: its "
-            "current sensor is connected the wrong way round or to another segment, or a force of this axis gives torque "
-            "that the angle's control works against.",
+            f"with 1 A of {name}, {_told(machine, k)} reads {answer[k]:+.2f} A where {_law(machine)} gives "
+            f"{EXPECTED[name][k]:+.0f} A: its current sensor is connected the wrong way round or to another segment, or "
+            "a force of this axis gives torque "
+            f"that the angle's control works against{_or_signs(machine)}.",
             machine.segments[k], Effect.ERROR,
         )  # fmt: skip
         return
@@ -70,6 +71,10 @@ def _told(machine: Servomotor, k: int) -> str:
 
 def _law(machine: Servomotor) -> str:
     return "(6.9)" if machine.components == 1 else "(7.12)"
+
+
+def _or_signs(machine: Servomotor) -> str:
+    return "" if machine.components == 1 else ", or i_y has the signs that T (7.13c), (7.13d) have in print"
 
 
 def _pushes(answers: dict[str, Array], machine: Servomotor) -> Iterator[Finding]:

@@ -76,7 +76,7 @@ def _along(own: float, across: float) -> bool:
 
 
 def _nudged(rig: Rig, record: Recorder, i_x: float, i_y: float) -> tuple[float, float]:
-    """The outboard AMB's control currents across and along the motor's first segment, A, with open-loop currents in the motor."""
+    """The outboard AMB's control currents across and along the motor's first segment, A, with open-loop currents in it."""
     write(rig, {"motor.across": i_x, "motor.along": i_y})
     rig.clock.sleep(_ramp_s(rig) + NUDGE_S)
     with record.step("nudge", i_x_A=i_x, i_y_A=i_y):

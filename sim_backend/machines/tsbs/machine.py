@@ -213,10 +213,8 @@ def places(
     return slice(None), list(goes.values())
 
 
-def spoil(
-    values: Array, at: Mapping[str, int], defects: Mapping[str, float], first: str = SEGMENTS[0]
-) -> None:
-    """Put planted defects of sensors into telemetry (n, signals), and the angle within a turn. `first`: of the segments' currents."""
+def spoil(values: Array, at: Mapping[str, int], defects: Mapping[str, float], first: str = SEGMENTS[0]) -> None:
+    """Put planted defects of sensors into telemetry (n, signals), and the angle within a turn. `first`: one of the segments."""
     values[:, at[first]] *= defects["segment_sign_1"]
     if defects["stuck_current_yo_p"]:
         values[:, at["i_yo_p"]] = 4.0

@@ -10,6 +10,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 from bench.rigfile import RigFile
 from bench.rigfile.toleranced import Toleranced
@@ -37,11 +38,12 @@ def stated(rig: RigFile) -> dict[str, Toleranced]:
 def params(v: Mapping[str, float], d: Mapping[str, float]) -> PlantParams:
     """The plant, and what is planted in its controller."""
     plant = machine.params(v, d, PAIRS)
-    return replace(plant, phases=6.0, **{name: d[name] for name in LITERAL})
+    planted: dict[str, Any] = {name: d[name] for name in LITERAL}
+    return replace(plant, phases=6.0, **planted)
 
 
 def constants(p: PlantParams, settings: Mapping[str, float]) -> dict[str, float]:
-    """Those of the machine, and the forces per ampere of i_y along and of i_x across the frame of its own, with the segments' gains
+    """Those of the machine, and the forces per ampere of i_y along and of i_x across its own frame, with the segments' gains
     (T chapter 7: alpha_t = sqrt 2 alpha_d, alpha_n = sqrt 2 alpha_c)."""
     gain = sum(p.segment_gain) / 4
     turned = math.cos(p.pole_pairs * p.gamma_zero)

@@ -1,7 +1,7 @@
-"""The truth of an angle step while the motor carries: the same machine makes the same steps many more times, its readings exact.
+"""The truth of an angle step while the motor carries: the same machine makes the same steps more often, read exactly.
 
-The encoder's counts stay, for the controller knows no other angle, and so does the noise of nothing: what the counts make of
-each step is what repeats scatter by, and the truth is the mean over many.
+The encoder's counts stay, for the controller knows no other angle: what they make of each step is what repeats scatter by, and
+the truth is the mean over many.
 """
 
 from __future__ import annotations
@@ -114,7 +114,11 @@ class _Carried:
         before, after = (x[:, POSITIONS] / gains for x in (rest, trace))
         peak, at_rest = (float(np.hypot(x[:, 2], x[:, 3]).max()) for x in (after, before))
         motor = after[:, :2] * (1 - share) + after[:, 2:] * share
-        yield from (("peak_outboard", peak), ("excess", peak - at_rest), ("peak_motor", float(np.hypot(*motor.T).max())))
+        yield from (
+            ("peak_outboard", peak),
+            ("excess", peak - at_rest),
+            ("peak_motor", float(np.hypot(*motor.T).max())),
+        )
 
     def _amplitude(self, trace: Array) -> float:
         gain, offset = (np.array(x) for x in (self.p.segment_sense, self.p.segment_offset))
