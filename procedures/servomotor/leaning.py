@@ -73,9 +73,9 @@ def of_leans(recording: Recording[Any]) -> Iterator[Finding]:
             yield Finding(
                 "motor-frame",
                 f"with the motor's set point {LEAN_M * 1e6:.0f} µm {WAYS[way]} and a twentieth of the load on it, the outboard "
-                f"AMB's control current changes by {own:+.3f} A along that way and by {other:+.3f} A across; expected a relief, "
-                "and hardly anything across: a sign in the controller's own frame, of a coordinate (T 7.6), of a current (T 7.13) or of "
-                "its feedback (T 7.14). The motor was not given the shaft.",
+                f"AMB's control current changes by {own:+.3f} A along that way and by {other:+.3f} A across; expected relief, "
+                "and hardly anything across: a sign in the controller's own frame, of a coordinate (T 7.6), of a current (T "
+                "7.13) or of its feedback (T 7.14). The motor was not given the shaft.",
                 f"set point, {WAYS[way]}", Effect.ERROR,
             )  # fmt: skip
             return
