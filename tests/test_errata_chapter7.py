@@ -83,7 +83,7 @@ def bound(i_x: float, i_y: float, literal: bool) -> float:
     """T (7.18): what force leaves to the torque current, A."""
     if literal:
         return abs(abs(i_y) - math.sqrt(LIMIT**2 - i_x**2))
-    scale = min(1.0, LIMIT / math.hypot(i_x, i_y))
+    scale = LIMIT / max(LIMIT, math.hypot(i_x, i_y))
     x, y = scale * i_x, scale * i_y
     return max(0.0, math.sqrt(max(0.0, LIMIT**2 - x**2)) - abs(y))
 

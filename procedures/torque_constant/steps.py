@@ -123,8 +123,8 @@ def read_wiring(recording: Recording[Plan]) -> Array:
 
 
 def wiring(table: StepTable[Sideways], machine: Servomotor) -> Array:
-    """Slopes of the outboard AMB's control currents, across and along the motor's first segment, over i_x and i_y, from the steps
-    at plus and minus."""
+    """Slopes of the outboard AMB's control currents, across and along the motor's first segment, over i_x and i_y, from the
+    steps at plus and minus."""
     if not len(table):
         return np.zeros((2, 2))
     asked = np.array([[1.0, step.i_x, step.i_y] for step in table.labels])
