@@ -210,8 +210,12 @@ def _sensitivity(done: Simulated) -> Found:
 
 
 def _spindown(done: Simulated) -> Found:
+    from sim_backend.motion import DragAsked
+
+    plan: Any = done.recording.plan
     of = done.drawn.machine.motions.drag
-    yield from ((name, "", value) for name, value in (of(done.drawn) if of is not None else {}).items())
+    asked = DragAsked(plan.bias_A, plan.bias_high_A, plan.motor_carries)
+    yield from ((name, "", value) for name, value in (of(done.drawn, asked) if of is not None else {}).items())
 
 
 def _derivative(done: Simulated) -> Found:

@@ -13,6 +13,7 @@ from bench.rigfile import RigFile
 from bench.rigfile.toleranced import Toleranced
 from sim_backend.machine import Machine, Truth
 from sim_backend.machines.tsbs import quantities as of
+from sim_backend.machines.tsbs.motions import MOTIONS
 from sim_backend.machines.tsbs.operator import SimulatedOperator
 from sim_backend.machines.tsbs.params import PlantParams, beta_of
 from sim_backend.machines.tsbs.plant import CHANNELS, TRACE, Plant
@@ -222,5 +223,5 @@ TSBS = Machine(
     integral_gains=frozenset(("ki_i", "ki_o", "ki_z", "ki_m")), turns=True,
     channels=CHANNELS, places=places, spoil=spoil,
     supply_V=148.0, windings={"temp_i": 0.0, "temp_o": 2.0, "temp_m": -3.0}, copper_W=copper_W,
-    operator=operator, daily=DAILY, traced=lambda _: TRACE, controls=Plant.settable,
+    operator=operator, daily=DAILY, traced=lambda _: TRACE, controls=Plant.settable, motions=MOTIONS,
 )  # fmt: skip
