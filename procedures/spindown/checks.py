@@ -17,6 +17,7 @@ from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.rigfile.roles import SPEED
 from bench.uncertainty import Estimate
+from procedures.servomotor.checks import idle
 from procedures.servomotor.conventions import Servomotor
 from procedures.servomotor.direction import of_probe
 from procedures.shared.leastsquares import linear
@@ -31,7 +32,6 @@ LARGEST_OFFSET_N_m = 0.02  # 4 mA of every segment's sensor are a little over 11
 LARGEST_CARRYING_N_m = 0.1
 """While the motor carries, segments 1 and 3 have 4 A that give no torque but by their difference: 1 % of either segment and
 0.3 % of either sensor are 75 mN m, and 20 um off the motor's magnetic centre another 9 mN m."""
-IDLE_A = 0.02  # the mean of four sensors' offsets is less
 LARGEST_WAVE_RAD = 1.5e-3  # a sound run-down leaves 0.45 mrad rms, the counts of the encoder
 COUNT_N_m = 0.01  # of the drive's torque
 SURE = 3.0  # standard uncertainties beyond what is stated
@@ -96,13 +96,8 @@ def _released(runs: Sequence[RunDown], machine: Servomotor, plan: Plan) -> Itera
         which = "the mean of the segments" if plan.motor_carries else one
         yield Finding("not-released", f"{which} carries {max(torque):.3f} A while the rotor should coast "
                       f"({RELEASED_A} A allowed): the motor is not released.", worst.where, Effect.INDETERMINATE)  # fmt: skip
-    if not plan.motor_carries:
-        return
-    idle = [abs(float(np.mean([r.coils[c] for c in machine.coils_of("xo", "yo")]))) for r in runs]
-    if max(idle) > IDLE_A:
-        yield Finding("not-idle", f"the outboard AMB's coils carry {max(idle):.3f} A on average while the motor should carry "
-                      f"({IDLE_A} A allowed): the drag is of another state.", runs[int(np.argmax(idle))].where,
-                      Effect.INDETERMINATE)  # fmt: skip
+    if plan.motor_carries:
+        yield from idle([r.coils for r in runs], machine, [r.where for r in runs])
 
 
 def _same_level(runs: Sequence[RunDown], plan: Plan) -> Iterator[Finding]:

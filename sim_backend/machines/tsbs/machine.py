@@ -62,7 +62,8 @@ def stated(rig: RigFile) -> dict[str, Toleranced]:
         out[f"position_gain_{axis}"] = certified.gain if certified else rig.simulation["position_gain"]
         out[f"position_offset_{axis}"] = certified.offset if certified else rig.simulation["position_offset"]
     for k in range(4):
-        out |= {f"segment_gain_{k}": rig.simulation["segment_gain"], f"segment_drift_{k}": rig.simulation["drift"]}
+        out |= {f"segment_gain_{k}": rig.machine["segment_gain"], f"segment_drift_{k}": rig.simulation["drift"]}
+    out["beta_4"] = rig.machine["torque_ripple"]
     out |= {
         name: t
         for name, t in rig.machine.items()
@@ -70,7 +71,7 @@ def stated(rig: RigFile) -> dict[str, Toleranced]:
     }
     for axis in "xy":
         out[f"motor_offset_{axis}"] = rig.simulation["motor_offset"]
-    shared = {"drift", "position_gain", "position_offset", "segment_gain", "motor_offset"}
+    shared = {"drift", "position_gain", "position_offset", "motor_offset"}
     return out | {k: t for k, t in rig.simulation.items() if isinstance(t, Toleranced) and k not in shared}
 
 
