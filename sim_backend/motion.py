@@ -94,6 +94,19 @@ class DragAsked:
 
 
 @dataclass(frozen=True)
+class SpeedsAsked:
+    """Runs at the torque limit: `settings` as those of steps; what is written `before` them, one after the other, once the
+    shaft is held; the parameters that choose each of the `sharings`, by its name; the speed reference that guards them, rad/s;
+    for how long each is watched in each direction, s."""
+
+    settings: Numbers
+    before: Sequence[Numbers]
+    sharings: Mapping[str, Numbers]
+    guard: float
+    seconds: float
+
+
+@dataclass(frozen=True)
 class Motions:
     """The truths of motion of one machine; None: it has none of that kind. Each takes the rig and what was drawn for it (a
     `Truth`) first.
@@ -109,6 +122,7 @@ class Motions:
         compare: what estimators do in the loop, by quantity and name, and ratios of two.
         peak: of settings, an axis' number and a speed, the greatest sensitivity and where, Hz, of the shaft that turns.
         drag: what stops the shaft that coasts, by the names of a spindown: B and B_high N m s/rad, T_c N m, J_z kg m^2.
+        speeds: at the torque limit, by sharing: `speed` rad/s, `bound` A of the torque current, `ripple` rad/s.
     """
 
     steps: Callable[[RigFile, Any, StepsAsked], tuple[Any, Mapping[tuple[float, int], Any]]] | None = None
@@ -121,6 +135,7 @@ class Motions:
     compare: Callable[[RigFile, Any, CompareAsked], Mapping[tuple[str, str], float]] | None = None
     drag: Callable[[Any, DragAsked], Mapping[str, float]] | None = None
     band: Callable[[RigFile, Any, BandAsked], Mapping[tuple[str, float | None], float]] | None = None
+    speeds: Callable[[RigFile, Any, SpeedsAsked], Mapping[str, Mapping[str, float]]] | None = None
 
 
 NONE = Motions()

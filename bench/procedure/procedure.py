@@ -147,7 +147,9 @@ class Procedure:
     def refuse_by(self, rig: RigFile, plan: Any, calibrations: Iterable[Calibration]) -> None:
         """Raises ConfigError if the plan cannot work by what is known of the rig; `calibrations` are those that it needs."""
         if problems := list(self.foresees(rig, plan, {c.procedure: c for c in calibrations})):
-            raise ConfigError("\n  ".join(["the plan does not fit what is known of the rig; nothing was started:", *problems]))
+            raise ConfigError(
+                "\n  ".join(["the plan does not fit what is known of the rig; nothing was started:", *problems])
+            )
 
     def steps(self, rig: RigFile, plan: Any) -> int:
         """How many steps `acquire` will record on a rig; 0 is unknown."""

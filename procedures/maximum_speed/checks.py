@@ -39,8 +39,8 @@ def of_events(recording: Recording[Plan]) -> Iterator[Finding]:
     for event in recording.events(GUARDED):
         yield Finding(
             "guarded",
-            f"the rotor reached {abs(event['guard']):.1f} rad/s, the speed reference that guards the run: what ends there is no "
-            "maximum speed. Give a lower limit_A.", f"{event['sharing']}", Effect.ERROR,
+            f"the rotor reached {abs(event['guard']):.1f} rad/s, the speed reference that guards the run: what ends there is "
+            "no maximum speed. Give a lower limit_A.", f"{event['sharing']}", Effect.ERROR,
         )  # fmt: skip
     for event in recording.events(UNSTEADY):
         text = f"the speed still changes by {event['change']:.2%} from one second to the next after {event['waited']:.0f} s."
@@ -91,8 +91,8 @@ def _bounds(windows: Sequence[Window], limit_A: float) -> Iterator[Finding]:
     if abs(off.told.told_bound - off.told.bound) > SAME * limit_A:
         yield Finding(
             "bound-differs",
-            f"the law's bound is {off.told.told_bound:.3f} A where {limit_A:g} A leave {off.told.bound:.3f} A beside i_x and i_y: "
-            "it has another limit, or computes another bound.", off.where, Effect.INDETERMINATE,
+            f"the law's bound is {off.told.told_bound:.3f} A where {limit_A:g} A leave {off.told.bound:.3f} A beside i_x and "
+            "i_y: it has another limit, or computes another bound.", off.where, Effect.INDETERMINATE,
         )  # fmt: skip
     most = max(windows, key=lambda w: w.told.largest)
     if most.told.largest > limit_A + NOISE_A:
@@ -119,8 +119,9 @@ def of_lag(result: Result, plan: Plan) -> Iterator[Finding]:
     if plan.commutation == "ahead" and abs(lag) > LATE_RAD:
         yield Finding(
             "commutation-late",
-            f"the currents lie {math.degrees(lag):.1f}° of the electrical turn behind the field at {result.of[where].speed:.0f} "
-            f"rad/s, {math.degrees(LATE_RAD):.1f}° are allowed: their lag is not compensated, or not by the right time.",
+            f"the currents lie {math.degrees(lag):.1f}° of the electrical turn behind the field at "
+            f"{result.of[where].speed:.0f} rad/s, {math.degrees(LATE_RAD):.1f}° are allowed: their lag is not compensated, or "
+            "not by the right time.",
             where, Effect.INDETERMINATE,
         )  # fmt: skip
 
@@ -129,7 +130,9 @@ def of_result(result: Result, plan: Plan) -> Iterator[Finding]:
     """Whether speeds, ratio and slope are what the facts expect."""
     shortest = TIME_CONSTANTS * result.time_constant_s
     if plan.dwell_s < shortest:
-        text = f"dwell_s: {plan.dwell_s:g} s are less than {TIME_CONSTANTS:g} J/B, {shortest:.1f} s: give at least that."
+        text = (
+            f"dwell_s: {plan.dwell_s:g} s are less than {TIME_CONSTANTS:g} J/B, {shortest:.1f} s: give at least that."
+        )
         yield Finding("dwell-short", text, "dwell_s", Effect.INDETERMINATE)
     found = list(_contradictions(result))
     yield from found or [_agreement(result)]
@@ -160,8 +163,8 @@ def _contradictions(result: Result) -> Iterator[Finding]:
                 "a brake), or the encoder's zero has moved.", name, Effect.INDETERMINATE,
             )  # fmt: skip
     if (far := _beyond(e["slope_apart"])) > SURE:
-        text = (f"torque over speed rises by {e['torque_slope'].value:.4f} N m s/rad from one run to the other, the spindown's B "
-                f"is {result.drag.value:.4f} ({far:.1f} U apart).")  # fmt: skip
+        text = (f"torque over speed rises by {e['torque_slope'].value:.4f} N m s/rad from one run to the other, the spindown's "
+                f"B is {result.drag.value:.4f} ({far:.1f} U apart).")  # fmt: skip
         yield Finding("slope-contradicts", text, "torque_slope", Effect.INDETERMINATE)
 
 

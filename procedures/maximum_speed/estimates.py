@@ -148,8 +148,15 @@ class _Model:
             current[name] = float(weights @ self.of[s].currents) / 4 + p[f"current_{s}"]
             bound[name] = self.of[s].bound + p[f"bound_{s}"]
             predicted = (per_A * current[name] - constant) / drag
-            out |= {f"speed_{name}": speed[name], f"predicted_{name}": predicted, f"apart_{name}": speed[name] - predicted}
-        ratio, slope = speed["op"] / speed["half"], per_A * (current["op"] - current["half"]) / (speed["op"] - speed["half"])
+            out |= {
+                f"speed_{name}": speed[name],
+                f"predicted_{name}": predicted,
+                f"apart_{name}": speed[name] - predicted,
+            }
+        ratio, slope = (
+            speed["op"] / speed["half"],
+            per_A * (current["op"] - current["half"]) / (speed["op"] - speed["half"]),
+        )
         return out | {
             "ratio": ratio, "ratio_predicted": bound["op"] / bound["half"], "torque_slope": slope,
             "ratio_apart": ratio - out["predicted_op"] / out["predicted_half"], "slope_apart": slope - drag,
@@ -163,7 +170,9 @@ def _inputs(
     out = {name: drag[name] for name in ("B", "B_high", "T_c")}
     out |= {name: torque[name] for name in ("alpha_tau", "gamma_0t")}
     out["drive"] = drive_drag(rig)
-    out["ripple"] = certified("machine/torque_ripple", machine["torque_ripple"], "ripple of the torque at the home angle")
+    out["ripple"] = certified(
+        "machine/torque_ripple", machine["torque_ripple"], "ripple of the torque at the home angle"
+    )
     for k in range(4):
         out[f"segment_{k}"] = _one_of(machine["segment_gain"], f"machine/segment_gain/{k + 1}", k)
     segments = {f"m{k}": c for k, c in enumerate(conventions(rig).segments)}
@@ -205,9 +214,11 @@ def _ripples(of: Mapping[str, Shared]) -> dict[str, Estimate]:
     """The speed's ripple by sharing, mean of the windows."""
     out = {}
     for s, name in ((HALF, "half"), (OP, "op")):
-        values = np.array([w.turning.ripple for w in of[s].windows])
-        u = float(values.std(ddof=1)) / math.sqrt(len(values))
+        ways = [np.array([w.turning.ripple for w in of[s].windows if w.direction == d]) for d in (1, -1)]
+        dof = sum(len(x) - 1 for x in ways)
+        spread = math.sqrt(sum(float(((x - x.mean()) ** 2).sum()) for x in ways) / dof)
+        u = spread * math.sqrt(sum(1 / len(x) for x in ways)) / 2
         scatter = Influence(id=f"scatter/ripple/{s}", name="scatter of the runs", u=u, unit="rad/s", kind="A",
-                            distribution="normal", dof=float(len(values) - 1))  # fmt: skip
-        out[f"ripple_{name}"] = Estimate.of(float(values.mean()), scatter)
+                            distribution="normal", dof=float(dof))  # fmt: skip
+        out[f"ripple_{name}"] = Estimate.of(float(np.mean([x.mean() for x in ways])), scatter)
     return out

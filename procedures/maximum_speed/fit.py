@@ -44,10 +44,12 @@ def share(limit: float, i_x: Array, i_y: Array, sharing: str) -> Array:
 
 @dataclass(frozen=True)
 class Turning:
-    """Mean `speed` over `turns` whole turns, rad/s with its sign, and `ripple`, the rms of its orders 1 to 4, rad/s."""
+    """Mean `speed` over `turns` whole turns, which the first `samples` are, rad/s with its sign, and `ripple`, the rms of its
+    orders 1 to 4, rad/s."""
 
     speed: float
     turns: int
+    samples: int
     ripple: float
 
 
@@ -80,7 +82,13 @@ def turning(t: Array, angle: Array) -> Turning:
     design = np.column_stack([np.ones_like(time), time - time[0], *waves])
     terms = np.linalg.lstsq(design, x, rcond=None)[0][2:].reshape(-1, 2)
     size = float((np.array(ORDERS) ** 2 * (terms**2).sum(axis=1)).sum())
-    return Turning(way * speed, turns, speed * math.sqrt(size / 2))
+    return Turning(way * speed, turns, last, speed * math.sqrt(size / 2))
+
+
+def whole_turns(samples: int, rate_hz: float, speed: float) -> int:
+    """How many of `samples` at a rate are whole turns: of currents that swing with the turn a part of one has another mean."""
+    turn = 2 * math.pi / abs(speed) * rate_hz
+    return round(int(samples / turn) * turn)
 
 
 def count_u(speed: float, turns: int, counts: int) -> float:

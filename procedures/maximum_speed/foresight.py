@@ -35,8 +35,8 @@ def reserve(rig: RigFile, plan: Plan) -> Iterator[str]:
         yield (f"set_point_m: found {plan.set_point_m * 1e6:g} µm; the controller takes {reach.low * 1e6:g} to "
                f"{reach.high * 1e6:g} µm")  # fmt: skip
     if limit - i_y < RESERVE_A:
-        yield (f"limit_A: found {limit:g} A; the shaft takes {i_y:.2f} A of i_y, and levitation {RESERVE_A:g} A of reserve. Give "
-               "a higher limit_A, or raise the set point (set_point_m, carried_A)")  # fmt: skip
+        yield (f"limit_A: found {limit:g} A; the shaft takes {i_y:.2f} A of i_y, and levitation {RESERVE_A:g} A of reserve. "
+               "Give a higher limit_A, or raise the set point (set_point_m, carried_A)")  # fmt: skip
 
 
 def expected_of(rig: RigFile, plan: Plan, facts: Mapping[str, Calibration]) -> Expected:
@@ -56,13 +56,14 @@ def speeds(rig: RigFile, plan: Plan, facts: Mapping[str, Calibration]) -> Iterat
     drag = facts["spindown"].values["B"]
     if found.speed[OP] > NEAR * guard:
         yield (
-            f"limit_A: {limit_of(rig, plan):g} A leave {found.torque[OP]:.2f} A of torque current, which by the adopted alpha_tau, B "
-            f"({drag.value:.4f} N m s/rad at {facts['spindown'].settings['bias_A']:g} A) and T_c turn the rotor at "
+            f"limit_A: {limit_of(rig, plan):g} A leave {found.torque[OP]:.2f} A of torque current, which by the adopted "
+            f"alpha_tau, B ({drag.value:.4f} N m s/rad at {facts['spindown'].settings['bias_A']:g} A) and T_c turn the rotor at "
             f"{found.speed[OP]:.0f} rad/s ({found.speed[OP] * RPM:.0f} r/min); the guard is {guard:g} rad/s, the envelope "
-            f"{rig.envelope.max_speed_rad_s:g} rad/s. Give a lower limit_A, and raise the set point where that leaves no reserve"
+            f"{rig.envelope.max_speed_rad_s:g} rad/s. Give a lower limit_A, and raise the set point where that leaves no "
+            "reserve"
         )
     if found.speed[HALF] < SLOWEST_RAD_S:
         yield (
-            f"limit_A: {limit_of(rig, plan):g} A leave {found.torque[HALF]:.2f} A of torque current with lambda 1/2, by which the "
-            f"rotor turns at {found.speed[HALF]:.1f} rad/s; expected {SLOWEST_RAD_S:g} rad/s or more"
+            f"limit_A: {limit_of(rig, plan):g} A leave {found.torque[HALF]:.2f} A of torque current with lambda 1/2, by which "
+            f"the rotor turns at {found.speed[HALF]:.1f} rad/s; expected {SLOWEST_RAD_S:g} rad/s or more"
         )

@@ -31,13 +31,19 @@ from procedures.servomotor.direction import of_probe
 from procedures.servomotor.parameters import BIASES, chosen, named, needed, stated, write
 from procedures.shared import assumptions
 
-SPEED_HALF = Quantity("speed_half", "rad/s", "steady speed at the torque limit with lambda 1/2, mean of both directions")
-SPEED_OP = Quantity("speed_op", "rad/s", "steady speed at the torque limit with lambda by T (6.24), mean of both directions")
+SPEED_HALF = Quantity(
+    "speed_half", "rad/s", "steady speed at the torque limit with lambda 1/2, mean of both directions"
+)
+SPEED_OP = Quantity(
+    "speed_op", "rad/s", "steady speed at the torque limit with lambda by T (6.24), mean of both directions"
+)
 RATIO = Quantity("ratio", "1", "speed with lambda by T (6.24) over that with lambda 1/2")
 RATIO_PREDICTED = Quantity(
     "ratio_predicted", "1", "ratio of the mean torque currents that the limit leaves beside the recorded |i_x|, |i_y|"
 )
-PREDICTED_HALF = Quantity("predicted_half", "rad/s", "speed with lambda 1/2 by torque constant, drag and torque current")
+PREDICTED_HALF = Quantity(
+    "predicted_half", "rad/s", "speed with lambda 1/2 by torque constant, drag and torque current"
+)
 PREDICTED_OP = Quantity("predicted_op", "rad/s", "speed with lambda by T (6.24) by the same")
 SLOPE = Quantity("torque_slope", "N m s/rad", "torque over speed from one sharing to the other")
 SD = Quantity("speed_sd", "rad/s", "rms of the speed about its mean within a turn, orders 1 to 4")

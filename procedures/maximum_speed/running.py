@@ -9,8 +9,8 @@ from bench.procedure.rig import Rig
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.roles import SPEED, told_in
-from procedures.maximum_speed.steps import GUARDED, NOT_CARRIED, RUN, SET_POINT, UNSTEADY, captured
 from procedures.maximum_speed.plan import HALF, OP, Plan
+from procedures.maximum_speed.steps import GUARDED, NOT_CARRIED, RUN, SET_POINT, SHARED, UNSTEADY, captured
 from procedures.servomotor import carrying
 from procedures.servomotor.conventions import conventions
 from procedures.servomotor.parameters import chosen, stated, write
@@ -72,6 +72,7 @@ def run_all(rig: Rig, plan: Plan, record: Recorder) -> None:
     for direction in (1, -1):
         for k, (sharing, repeat) in enumerate(order(plan, direction)):
             rig.levitation.write(chosen(rig.file, "sharing", sharing))
+            record.event(SHARED, sharing=sharing, direction=direction)
             if k == 0 and _reaches(rig, plan, direction):
                 record.event(GUARDED, guard=direction * guard_of(rig.file, plan), sharing=sharing)
                 return

@@ -20,6 +20,7 @@ from procedures.servomotor.conventions import Servomotor, conventions
 Array = npt.NDArray[np.float64]
 RUN = "run"
 GUARDED, UNSTEADY, NOT_CARRIED, SET_POINT = "guarded", "unsteady", "not-carried", "set-point"
+SHARED = "sharing"  # event: the segments are shared another way from now on
 """Events: the rotor reached the speed that guards the run; its speed did not become steady; no set point makes the motor carry
 what was asked for; where it holds its end."""
 DEMANDS, GIVEN, BOUND, SHARE = ("demand_x", "demand_y"), "torque_given", "torque_bound", "lambda"
@@ -98,7 +99,9 @@ def read_windows(recording: Recording[Plan], limit_A: float) -> list[Window]:
     machine = conventions(recording.rig)
     found = [_read(recording, step, machine, limit_A) for step in recording.steps(RUN)]
     if not found:
-        raise AnalysisError("found no runs at the torque limit; expected those of the plan (was the run stopped early?)")
+        raise AnalysisError(
+            "found no runs at the torque limit; expected those of the plan (was the run stopped early?)"
+        )
     return found
 
 
@@ -112,19 +115,24 @@ def _read(recording: Recording[Plan], step: Step, machine: Servomotor, limit_A: 
         raise AnalysisError(f"run {dict(labels)}: found no capture")
     t = (data["t_ns"] - data["t_ns"][0]).astype(np.float64) * 1e-9
     flags: npt.NDArray[Any] = data[STATUS].astype(np.int64)
+    turning = fit.turning(t, data[ANGLE])
+    whole = slice(turning.samples)
     return Window(
         sharing=str(labels["sharing"]), direction=int(labels["direction"]), repeat=int(labels["repeat"]),
-        turning=fit.turning(t, data[ANGLE]),
-        segments=np.array([float(data[c].mean()) for c in machine.segments]),
+        turning=turning,
+        segments=np.array([float(data[c][whole].mean()) for c in machine.segments]),
         coils={c: float(data[c].mean()) for c in coils(machine)},
         flags=int(np.bitwise_or.reduce(flags)),
-        told=_told(captures[0], machine, str(labels["sharing"]), limit_A),
+        told=_told(captures[0], machine, str(labels["sharing"]), limit_A, turning.speed),
         lost=step.lost(), expected=step.expected(),
     )  # fmt: skip
 
 
-def _told(capture: Captured, machine: Servomotor, sharing: str, limit_A: float) -> Told:
-    data = capture.arrays(*captured(machine))
+def _told(capture: Captured, machine: Servomotor, sharing: str, limit_A: float, speed: float) -> Told:
+    whole = fit.whole_turns(capture.samples, capture.rate_hz, speed)
+    if not whole:
+        raise AnalysisError(f"capture of a run at {speed:.1f} rad/s: found less than a turn; expected one at least")
+    data = {name: x[:whole] for name, x in capture.arrays(*captured(machine)).items()}
     i_x, i_y = (data[name] for name in DEMANDS)
     along, across = (np.array([data[c] for c in names]) for names in (machine.segments, ACROSS))
     return Told(

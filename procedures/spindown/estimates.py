@@ -1,8 +1,9 @@
 """Drag of a levitated rotor from its run-downs: B at two bias currents, Coulomb torque and, with a ring, the inertia.
 
 With b and c of `spindown`, B = J b and T_c = J c. The eddy currents' part of B goes with the square of the bearings' flux
-and so with q, the mean over the radial axes that hold the shaft of ((i_p + i_n)/2)^2. The coil currents, freed of their sensors' offset and
-gain, say which q a coast really had; the straight line of B over q through both biases gives B at exactly the nominal ones.
+and so with q, the mean over the radial axes that hold the shaft of ((i_p + i_n)/2)^2. The coil currents, freed of their
+sensors' offset and gain, say which q a coast really had; the straight line of B over q through both biases gives B at exactly
+the nominal ones.
 
 A constant torque of the motor (an offset of its current sensors) brakes one way and drives the other: it drops out of the
 mean over the directions, and half of the difference of c is that torque over J.
