@@ -57,8 +57,8 @@ def speeds(rig: RigFile, plan: Plan, facts: Mapping[str, Calibration]) -> Iterat
     if found.speed[OP] > NEAR * guard:
         yield (
             f"limit_A: {limit_of(rig, plan):g} A leave {found.torque[OP]:.2f} A of torque current, which by the adopted "
-            f"alpha_tau, B ({drag.value:.4f} N m s/rad at {facts['spindown'].settings['bias_A']:g} A) and T_c turn the rotor at "
-            f"{found.speed[OP]:.0f} rad/s ({found.speed[OP] * RPM:.0f} r/min); the guard is {guard:g} rad/s, the envelope "
+            f"alpha_tau, B ({drag.value:.4f} N m s/rad at {facts['spindown'].settings['bias_A']:g} A) and T_c turn the rotor "
+            f"at {found.speed[OP]:.0f} rad/s ({found.speed[OP] * RPM:.0f} r/min); the guard is {guard:g} rad/s, the envelope "
             f"{rig.envelope.max_speed_rad_s:g} rad/s. Give a lower limit_A, and raise the set point where that leaves no "
             "reserve"
         )
