@@ -14,7 +14,7 @@ from bench.recording import Captured, Recording, Step
 from bench.rigfile.roles import ANGLE, SPEED, STATUS
 from procedures.maximum_speed import fit
 from procedures.maximum_speed.fit import Turning
-from procedures.maximum_speed.plan import Plan
+from procedures.maximum_speed.plan import HALF, OP, Plan
 from procedures.servomotor.conventions import Servomotor, conventions
 
 Array = npt.NDArray[np.float64]
@@ -48,12 +48,14 @@ def captured(machine: Servomotor) -> tuple[str, ...]:
 @dataclass(frozen=True)
 class Told:
     """A window's capture, means over it: `sizes` of i_x, i_y (2,) A; the `bound` and `share` that follow from them at every
-    instant; what the law told of bound, share and torque current; `at_bound`, in which share of the samples it gave all;
-    segments `along` and `across` the field (4,) A; the largest amplitude of a segment A."""
+    instant, and the share that the other sharing would make; what the law told of bound, share and torque current; `at_bound`,
+    in which share of the samples it gave all; segments `along` and `across` the field (4,) A; the largest amplitude of a
+    segment A."""
 
     sizes: Array
     bound: float
     share: float
+    other_share: float
     told_bound: float
     told_share: float
     given: float
@@ -139,6 +141,7 @@ def _told(capture: Captured, machine: Servomotor, sharing: str, limit_A: float, 
         sizes=np.array([np.abs(i_x).mean(), np.abs(i_y).mean()]),
         bound=float(fit.bound(limit_A, i_x, i_y, sharing).mean()),
         share=float(fit.share(limit_A, i_x, i_y, sharing).mean()),
+        other_share=float(fit.share(limit_A, i_x, i_y, OP if sharing == HALF else HALF).mean()),
         told_bound=float(data[BOUND].mean()),
         told_share=float(data[SHARE].mean()),
         given=float(data[GIVEN].mean()),
