@@ -39,6 +39,7 @@ B_HIGH = Quantity(
 T_C = Quantity("T_c", "N m", "Coulomb torque of the rotor alone, mean over the directions that it was turned in")
 J_Z = Quantity("J_z", "kg m^2", "polar inertia: by the ring where one was mounted, else the rig file's as used")
 MEASURES = (B, B_HIGH, T_C, J_Z)
+BY_SPEED, CARRIED = "by the speed channel", "motor carries"
 RAMP_S = 0.25  # what is left of the run-up's ramp when the speed is nearly there
 SLOW = (0.1, 0.15, 0.2, 0.25, 0.3)  # shares of the speed that the drive also holds: they tell its constant torque
 
@@ -164,6 +165,7 @@ class Analysis:
     angle: Drag
     speed: Drag | None  # where a run-down is too short for the speed's filter
     inertia: Estimate
+    motor_carries: bool = False
 
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis | Coasted:
@@ -182,18 +184,19 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis | Coast
         text = "J_z is the rig file's value, not measured here; B and T_c carry its tolerance. The ring measures it"
         findings.add([Finding("inertia-as-stated", text, "J_z")])
     findings.add([drawn.stopping(runs, angle, plan.speed_rad_s)])
-    return Analysis(runs, angle, speed, _inertia(angle, rig))
+    return Analysis(runs, angle, speed, _inertia(angle, rig), plan.motor_carries)
 
 
 def measured(a: Analysis | Coasted) -> Iterator[Measured]:
     """B and T_c by the speed if it could be fitted, and all quantities by the angle, which are the results."""
+    state = CARRIED if isinstance(a, Analysis) and a.motor_carries else ""
     if isinstance(a, Analysis) and a.speed is not None:
         for quantity in (B, T_C):
-            yield quantity.measured(a.speed.estimates[quantity.name], "by the speed channel")
+            yield quantity.measured(a.speed.estimates[quantity.name], f"{state}, {BY_SPEED}" if state else BY_SPEED)
     estimates = facts(a)
     for quantity in MEASURES:
         if quantity.name in estimates:
-            yield quantity.measured(estimates[quantity.name])
+            yield quantity.measured(estimates[quantity.name], state)
 
 
 def _inertia(result: Drag, rig: RigFile) -> Estimate:
@@ -258,7 +261,7 @@ def requires(rig: RigFile) -> Requires:
 
 procedure = Procedure(
     name="spindown",
-    places=("by the speed channel",),
+    places=(BY_SPEED, CARRIED),
     title="Drag of the levitated rotor by spindown",
     measures=MEASURES,
     state=RigState.LEVITATED,
