@@ -56,8 +56,17 @@ def stated(rig: RigFile, key: str) -> Parameter:
     return rig.parameters[parameter(rig, key)]
 
 
+def named(rig: RigFile, values: Mapping[str, float]) -> dict[str, float]:
+    """Values by the names of the parameters.
+
+    Raises:
+        Lacking: the controller has none for one of them.
+    """
+    return {parameter(rig, key): value for key, value in values.items()}
+
+
 def chosen(rig: RigFile, kind: str, name: str) -> dict[str, float]:
-    """The parameters, by their names, that choose a setting of `[capabilities.settings]`.
+    """The parameters that choose a setting, by their names.
 
     Raises:
         Lacking: the controller has none of that name.
@@ -66,15 +75,6 @@ def chosen(rig: RigFile, kind: str, name: str) -> dict[str, float]:
     if name not in known:
         raise Lacking(f"capabilities.settings.{kind}: found no {name}; it has {', '.join(known) or 'none'}")
     return dict(known[name])
-
-
-def named(rig: RigFile, values: Mapping[str, float]) -> dict[str, float]:
-    """Values by the names of the parameters.
-
-    Raises:
-        Lacking: the controller has none for one of them.
-    """
-    return {parameter(rig, key): value for key, value in values.items()}
 
 
 def write(rig: Rig, values: Mapping[str, float]) -> None:
