@@ -12,9 +12,10 @@ import numpy.typing as npt
 from bench.rigfile import RigFile
 from bench.rigfile.toleranced import Toleranced
 from sim_backend.machine import Machine, Truth
+from sim_backend.machines.tsbs import liftoff
 from sim_backend.machines.tsbs import quantities as of
 from sim_backend.machines.tsbs.operator import SimulatedOperator
-from sim_backend.machines.tsbs.params import PlantParams, beta_of
+from sim_backend.machines.tsbs.params import ControlParams, PlantParams, beta_of
 from sim_backend.machines.tsbs.plant import CHANNELS, TRACE, Plant
 from sim_backend.spoken import channels_by_reading
 
@@ -168,7 +169,8 @@ def _sensed(plant: PlantParams, v: Mapping[str, float], d: Mapping[str, float]) 
 
 def quantities(p: PlantParams, settings: Mapping[str, float]) -> dict[str, float]:
     """The true quantities, for the bias among the controller's parameters."""
-    return of.quantities(p, (settings["bias_i"], settings["bias_o"]))
+    most = settings.get("segment_max", ControlParams.segment_max)
+    return of.quantities(p, (settings["bias_i"], settings["bias_o"])) | liftoff.quantities(p, most)
 
 
 def make(p: PlantParams, seed: int, substeps: int) -> Plant:
