@@ -77,6 +77,7 @@ def check_rig_file(rig: str, procedure: str = "") -> int:
     procedures it can run; 2 if there is a problem, or if it cannot run the one that is asked for."""
     from bench.cli import protected, sampled
     from bench.cli.abilities import Ability, abilities, told, unknown_plans
+    from bench.rigfile.based import read_merged
     from bench.rigfile.check import as_far_as_read, check_rig
 
     path = catalogue.rig_path(rig)
@@ -86,7 +87,7 @@ def check_rig_file(rig: str, procedure: str = "") -> int:
         able = abilities(file, procedure)
         of_procedures = dict.fromkeys(p for a in able for p in a.problems)  # a spec that cannot be read is each one's
         of_files = (*_of_spec(file.name), *of_procedures, *_of_simulation(file), *_of_calibrations(file))
-        problems += (*unknown_plans(file), *of_files)
+        problems += read_merged(path).attributed((*unknown_plans(file), *of_files))
     for problem in problems:
         sys.stderr.write(f"{problem}\n")
     if load is not None:

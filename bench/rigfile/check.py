@@ -37,12 +37,12 @@ def check_rig(rig: str) -> tuple[tuple[Problem, ...], BusLoad | None]:
         loaded = RigFile.parse(text.toml, text.dbc, str(text.path))
     except ConfigError as error:
         if not error.problems:
-            return (Problem(str(text.path), "(file)", str(error), "a rig file"),), None
-        return error.problems + tuple(_behind(text, error.problems)), None
+            return text.told([Problem(str(text.path), "(file)", str(error), "a rig file")]), None
+        return text.told([*error.problems, *_behind(text, error.problems)]), None
     load = None
     with contextlib.suppress(ConfigError, KeyError):
         load = bus_load(loaded.messages, loaded.link.bitrate, loaded.link.data_bitrate) if loaded.link.bitrate else None
-    return tuple(problems_of(loaded)), load
+    return text.told(problems_of(loaded)), load
 
 
 def _behind(text: RigText, problems: tuple[Problem, ...]) -> Iterator[Problem]:

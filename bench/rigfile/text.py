@@ -2,35 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from bench import catalogue
-from bench.errors import ConfigError
-from bench.inputfile import TomlError, decoded, parse_toml, read_regular
+from bench.errors import ConfigError, Problem
+from bench.inputfile import decoded, read_regular
+from bench.rigfile.based import Merged, read_merged
 from bench.rigfile.migration import to_schema_2
+from bench.rigfile.tomltext import MOST_TOML, parse_text
+
+__all__ = ["MOST_DBC", "MOST_TOML", "SCHEMA", "RigText", "migrated", "parse_text", "read_rig"]
 
 SCHEMA = 2
-MOST_TOML = 1 << 20
 MOST_DBC = 16_000_000
-"""Bytes of a rig file, and of its DBC wherever it lies."""
+"""Bytes of a rig's DBC, wherever it lies."""
 
 MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {1: to_schema_2}
 """From an older schema to the next one."""
-
-
-def parse_text(text: str, path: str) -> dict[str, Any]:
-    """TOML of a rig file.
-
-    Raises:
-        ConfigError: it is not.
-    """
-    try:
-        return parse_toml(text)
-    except TomlError as error:
-        raise ConfigError(f"rig file {path}: {error}") from error
 
 
 def migrated(data: dict[str, Any], path: str) -> dict[str, Any]:
@@ -53,11 +44,16 @@ def migrated(data: dict[str, Any], path: str) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class RigText:
-    """A rig file's two texts and where it lies."""
+    """A rig file's two texts and where it lies. `toml` holds what the file is based on, too: it stands by itself."""
 
     path: Path
     toml: str
     dbc: str
+    merged: Merged
+
+    def told(self, problems: Iterable[Problem]) -> tuple[Problem, ...]:
+        """Problems of the rig, each with the file in which its key stands, and those of how the files are laid."""
+        return (*self.merged.problems, *self.merged.attributed(problems))
 
 
 def read_rig(rig: str) -> RigText:
@@ -67,19 +63,15 @@ def read_rig(rig: str) -> RigText:
         ConfigError: unknown rig, unreadable file, or a DBC that is not there.
     """
     path = catalogue.rig_path(rig)
-    try:
-        text = decoded(read_regular(path, MOST_TOML), "utf-8")
-    except OSError as error:
-        raise ConfigError(f"rig file {path}: cannot be read: {error.strerror or error}") from error
-    except UnicodeDecodeError as error:
-        raise ConfigError(f"rig file {path}: byte {error.start} is not UTF-8; expected TOML, which is UTF-8") from error
-    data = parse_text(text, str(path))
-    links = _table(data, "links")
-    used = str(_table(_table(data, "devices"), "controller").get("link", ""))
+    merged = read_merged(path)
+    links = _table(merged.data, "links")
+    used = str(_table(_table(merged.data, "devices"), "controller").get("link", ""))
     mapped = [n for n in (used, *links) if _table(links, n).get("dbc")]  # another's, if the controller's has none
     if not mapped:
         raise ConfigError(f'rig file {path}: links: found no dbc; expected [links.NAME] with dbc = "FILE.dbc"')
-    return RigText(path, text, _dbc_text(path, f"links.{mapped[0]}", links[mapped[0]]))
+    key = f"links.{mapped[0]}"
+    file = Path(merged.file_of(f"{key}.dbc"))
+    return RigText(path, merged.toml, _dbc_text(file, key, links[mapped[0]]), merged)
 
 
 def _dbc_text(path: Path, key: str, link: Mapping[str, Any]) -> str:

@@ -68,7 +68,7 @@ def stated(rig: RigFile) -> dict[str, Toleranced]:
         for name, t in rig.machine.items()
         if name in ("pole_pairs", "polar_inertia", "ring_inertia", "drive_drag")
     }
-    for axis in "xy":
+    for axis in "xy":  # unless the rig file states it for that axis
         out[f"motor_offset_{axis}"] = rig.simulation["motor_offset"]
     shared = {"drift", "position_gain", "position_offset", "segment_gain", "motor_offset"}
     return out | {k: t for k, t in rig.simulation.items() if isinstance(t, Toleranced) and k not in shared}
