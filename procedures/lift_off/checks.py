@@ -22,6 +22,7 @@ FATAL = ("stuck-channel", "contact-silent")
 SURE = 1.5  # times the interval: three standard uncertainties
 LIMIT = 0.01  # of what i_y is told to take at most: sensors are within 0.3 %
 LOAD = 0.2  # of the weight's share: force constant 3 %, magnetic centre 20 um or 10 %
+LIGHT_N = 1.0  # an end that presses less on its ring is taken up by the start's own motion
 DEPTH_M = 30e-6  # clearance 5 um, probe's zero 10 um, its gain 2.5 um, with room
 
 
@@ -55,8 +56,7 @@ def of_lifts(a: Analysis, rig: RigFile, machine: Servomotor, touching: list[floa
     if zero:
         yield Finding(
             "lifts-at-zero",
-            f"the motor lifts the outboard end at gamma = 0{_so_predicted(a, lifts=True)}: there is no phase angle to be "
-            "measured.",
+            f"the motor lifts the outboard end at gamma = 0{_so_predicted(a)}: there is no phase angle to be measured.",
             zero, Effect.INDETERMINATE,
         )  # fmt: skip
         return
@@ -66,27 +66,28 @@ def of_lifts(a: Analysis, rig: RigFile, machine: Servomotor, touching: list[floa
         most = math.degrees(plan.gamma_max_rad)
         yield Finding(
             "does-not-lift",
-            f"the outboard end stays on its ring up to {most:.2f}°{_so_predicted(a, lifts=False)}. Look at the motor's "
-            "current, and at what weighs on the shaft.",
+            f"the outboard end stays on its ring up to {most:.2f}°. Look at the motor's current, and at what weighs on the "
+            "shaft.",
             str(stays[0].labels), Effect.INDETERMINATE,
         )  # fmt: skip
 
 
 def _at_zero(a: Analysis, touching: list[float]) -> str:
-    if a.dwells is None:
-        return "lift 1" if a.held is not None else ""
-    off = [str(label) for label, share in zip(a.dwells.labels, touching, strict=True) if share < 0.5]
-    return off[0] if off else ""
+    """The lift that came before gamma was turned; "" where there is none."""
+    turned = {(r.labels.repeat, r.labels.way) for r in a.ramps}
+    up = [str(x) for x in (() if a.held is None else a.held.labels) if (x.repeat, x.way) not in turned]
+    off = [
+        str(x) for x, share in zip(() if a.dwells is None else a.dwells.labels, touching, strict=True) if share < 0.5
+    ]
+    return next(iter((*up, *off)), "")
 
 
-def _so_predicted(a: Analysis, *, lifts: bool) -> str:
-    e = a.estimates.get("gamma_predicted")
-    if e is None:
+def _so_predicted(a: Analysis) -> str:
+    if (e := a.estimates.get("surplus")) is None:
         return ""
     found = interval(e)
-    said = f"{math.degrees(e.value):.2f}° ({math.degrees(found.low):.2f}° to {math.degrees(found.high):.2f}°)"
-    agrees = "as" if not lifts or found.low <= 0 else "where"
-    return f", {agrees} the prediction says {said}"
+    said = "as predicted" if found.high >= -LIGHT_N else "against the prediction"
+    return f", {said}: its force is {e.value:+.1f} N ({found.low:+.1f} N to {found.high:+.1f} N) beyond what lifts it"
 
 
 def _on_the_ring(a: Analysis, rig: RigFile, machine: Servomotor, plan: Plan) -> Iterator[Finding]:
@@ -130,7 +131,7 @@ def of_rotor(a: Analysis, plan: Plan) -> Iterator[Finding]:
 
 def of_place(a: Analysis, rig: RigFile, machine: Servomotor) -> Iterator[Finding]:
     """Where the ring is, and what the shaft weighs, by the rig file."""
-    clearance, depth = rig.geometry["clearance"].value, a.estimates["rest_depth"].value
+    clearance, depth = rig.geometry["clearance"].value, a.estimates.get("rest_depth", Estimate.exact(math.nan)).value
     if abs(depth - clearance) > DEPTH_M:
         yield Finding(
             "ring-elsewhere",

@@ -33,8 +33,9 @@ WRITE_S = 0.01  # within which a write of gamma acts: a request and its reply
 
 @dataclass(frozen=True)
 class Analysis:
-    """`gammas` (N, 2) rad of the lifts below and above, by repeat; `estimates` by quantity, `zero_predicted` beside them;
-    `lifted` are indices into the ramps' samples, None where the end stayed down. `limit_A` is what i_y took on the ring."""
+    """`gammas` (N, 2) rad of the lifts below and above, by repeat; `estimates` by quantity, `zero_predicted` rad and `surplus`
+    N beside them; `lifted` are indices into the ramps' samples, None where the end stayed down. `limit_A` is what i_y took on
+    the ring."""
 
     rest: StepTable[Rest]
     dwells: StepTable[Dwell] | None
@@ -58,7 +59,7 @@ def evaluate(recording: Recording[Plan], rest: StepTable[Rest]) -> Analysis:
     low = _lowest(
         machine, rest, dwells, held, [r.before(k) for r, k in zip(ramps, lifted, strict=True) if k is not None]
     )
-    found = {"rest_depth": _depth(low["yo"], inputs["gain_yo"])}
+    found = {} if dwells is None else {"rest_depth": _depth(low["yo"], inputs["gain_yo"])}
     limit, slope = math.nan, math.nan
     if held is not None:
         predicted, limit, slope = _predicted(machine, low, dwells, held, inputs)
@@ -79,8 +80,9 @@ def _lowest(
         return {axis: np.array([b[axis] for b in before]) for axis in machine.positions}
     if dwells is not None:
         return {axis: dwells.mean[channel] for axis, channel in machine.positions.items()}
-    up = rest if held is None else held
-    return {axis: (rest if axis == "yo" else up).mean[channel] for axis, channel in machine.positions.items()}
+    up, (x, y) = rest if held is None else held, machine.positions_of("xo", "yo")
+    deep = {"yo": -np.hypot(rest.mean[x], rest.mean[y])}  # at rest it may lie beside the lowest place of its ring
+    return {axis: deep.get(axis, up.mean[channel]) for axis, channel in machine.positions.items()}
 
 
 def _leaves(r: Ramped, depth: Mapping[Dwell, float], plan: Plan) -> int | None:
@@ -133,7 +135,8 @@ def _predicted(
     machine: Servomotor, low: Mapping[str, Array], dwells: StepTable[Dwell] | None, held: StepTable[Held],
     inputs: dict[str, Estimate],
 ) -> tuple[dict[str, Estimate], float, float]:  # fmt: skip
-    """`gamma_predicted` and `zero_predicted` rad, i_y at its limit A, and the growth of the force N/rad there."""
+    """`gamma_predicted` and `zero_predicted` rad, where there are any, and `surplus` N, the motor's force at gamma = 0 beyond
+    what lifts the end; i_y at its limit A; and the growth of the force with gamma N/rad where it lifts."""
     below = {axis: float(x.mean()) for axis, x in low.items()}
     above = {axis: float(held.mean[channel].mean()) for axis, channel in machine.positions.items()}
     carrying = held.stack(machine.segments).mean(axis=1)
@@ -142,21 +145,27 @@ def _predicted(
     def limit(p: Mapping[str, float]) -> float:
         return p["limit"] if at_limit is None else fit.currents(p, at_limit)[1]
 
-    def ends(p: Mapping[str, float]) -> tuple[float, float, float]:
+    def load(p: Mapping[str, float]) -> tuple[float, float]:
         y, x = (fit.at_motor(p, a, above[f"{a}i"] - below[f"{a}i"], above[f"{a}o"] - below[f"{a}o"]) for a in "yx")
-        return fit.thresholds(p, *fit.load(p, carrying, y, x), limit(p))
+        return fit.load(p, carrying, y, x)
 
     def model(p: dict[str, float]) -> dict[str, float]:
-        first, last, _ = ends(p)
-        return {"gamma_predicted": (last - first) / 2, "zero_predicted": (last + first) / 2}
+        first, last, _ = fit.thresholds(p, *load(p), limit(p))
+        at_zero = fit.surplus(p, *load(p), limit(p), 0.0)
+        return {"gamma_predicted": (last - first) / 2, "zero_predicted": (last + first) / 2, "surplus": at_zero}
 
     values = {name: e.value for name, e in inputs.items()}
-    slope, found = ends(values)[2], {}
-    for name, e in by_inputs(model, inputs).items():
-        away = Estimate.of(0.0, _bound(f"statics/{name}", "ripple and side pull", AWAY_N, "N"))
-        total = e + away * (1 / slope) if slope > 0 else e
-        found[name] = Estimate(total.value, "rad", total.sensitivities, total.sampler)
-    return found, limit(values), slope
+    slope = fit.thresholds(values, *load(values), limit(values))[2]
+    found = by_inputs(model, inputs)
+    away = {name: Estimate.of(0.0, _bound(f"statics/{name}", "ripple and side pull", AWAY_N, "N")) for name in found}
+    told = {"surplus": _in("N", found["surplus"] + away["surplus"])}
+    if slope > 0:  # else it lifts at once, and there is no angle
+        told |= {name: _in("rad", found[name] + away[name] * (1 / slope)) for name in found if name != "surplus"}
+    return told, limit(values), slope
+
+
+def _in(unit: str, e: Estimate) -> Estimate:
+    return Estimate(e.value, unit, e.sensitivities, e.sampler)
 
 
 def fit_inputs(recording: Recording[Plan]) -> dict[str, Estimate]:

@@ -79,6 +79,14 @@ def load(p: Numbers, held: Array, y_m: float, x_m: float) -> tuple[float, float]
     return f_x + alpha_x * x_m, f_y + alpha_x * y_m
 
 
+def surplus(p: Numbers, l_x: float, l_y: float, limit_A: float, gamma: float) -> float:
+    """By how much the motor's force exceeds what lifts the end, N, at a phase angle: both sides of (2)."""
+    d, c, zero = constants(p)
+    turn = p["pole_pairs"] * gamma - zero
+    across = (l_x + c * limit_A * math.sin(turn)) / (d * math.cos(turn))
+    return d * limit_A * math.cos(turn) + c * math.sin(turn) * across - l_y
+
+
 def thresholds(p: Numbers, l_x: float, l_y: float, limit_A: float) -> tuple[float, float, float]:
     """Phase angles below and above from which on the motor lifts, rad, by (3), and how fast the force grows there, N/rad, the
     mean of both. Where there is no root both are where the force is least: it lifts at once."""

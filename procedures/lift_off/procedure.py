@@ -203,8 +203,9 @@ procedure = Procedure(
     check=check,
     settings=settings,
     step_count=step_count,
+    fewest_steps=lambda plan: 2,
     needs=needs,
-    optional=(GAMMA_LIFT, PREDICTED, GAMMA_ZERO),
+    optional=MEASURES,
     assumes=assumptions.LIFT_OFF,
     method=read_method(__file__),
 )

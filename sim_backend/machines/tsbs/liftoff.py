@@ -14,6 +14,7 @@ from sim_backend.machines.tsbs.params import ControlParams, PlantParams
 
 FURTHEST_RAD = math.radians(8)  # where the search ends: there the force has turned by 64 degrees
 STEPS, HALVINGS = 128, 40
+LIGHT_N = 1.0  # an end that presses less on its ring is taken up by the start's own motion, or by noise
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,7 @@ def surplus(p: PlantParams, at: Resting, gamma: float, limit_A: float) -> float:
 
 
 def thresholds(p: PlantParams, limit_A: float) -> tuple[float, float] | None:
-    """The angles, below and above, from which on the motor lifts, rad; None where it lifts at once, or never."""
+    """The angles, below and above, from which on the motor lifts, rad; None where it lifts at once (LIGHT_N), or never."""
     at = resting(p)
 
     def left(gamma: float) -> float:
@@ -80,7 +81,7 @@ def thresholds(p: PlantParams, limit_A: float) -> tuple[float, float] | None:
     grid = [p.gamma_zero + FURTHEST_RAD * k / STEPS for k in range(-STEPS, STEPS + 1)]
     found = [left(gamma) for gamma in grid]
     lowest = min(range(len(grid)), key=found.__getitem__)
-    if left(0.0) >= 0 or found[lowest] >= 0:
+    if left(0.0) >= -LIGHT_N:
         return None
     out = []
     for way in (-1, 1):

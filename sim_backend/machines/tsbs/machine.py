@@ -32,9 +32,12 @@ DEFECTS = {
     "fault_after_s": 0.0, "drive_fault_after_s": 0.0, "exchange_segments": 0.0, "segment_sign_1": 1.0,
     "encoder_sign": 1.0, "lever_slip": 0.0, "segment_scale_drift": 0.0, "drive_brakes": 0.0, "factor_gamma": 1.0,
     "factor_kp_theta": 1.0, "factor_kd_theta": 1.0, "factor_sine_amplitude": 1.0, "factor_angle_ref": 1.0,
+    "factor_segment_max": 1.0, "factor_gamma_slew": 1.0, "ring_friction": 0.1, "contact_silent": 0.0, "weight_left_kg": 0.0,
 }  # fmt: skip
 """Planted defects and their harmless values. Mass errors are relative; `factor_...` is what the controller makes of a
 parameter, over what it was told; `segment_scale_drift` is relative, 1/s, of all four segments' sensors."""
+
+CONTACT = 4 | 8  # of the flags, inboard and outboard
 
 DAILY = frozenset(
     ("site.air_density", *(f"drift_{k}" for k in range(len(COILS))), *(f"segment_drift_{k}" for k in range(4)))
@@ -111,6 +114,7 @@ def _carried(v: Mapping[str, float], d: Mapping[str, float]) -> PlantParams:
         brake=v.get("drive_drag", 0.0) + d["drive_brakes"],
         lever_slip=d["lever_slip"],
         clearance=v["geometry.clearance"],
+        ring_friction=d["ring_friction"],
         coil_limit=tuple(limit),
         lost_radius=0.92 * v["geometry.clearance"],
     )
@@ -179,7 +183,9 @@ def make(p: PlantParams, seed: int, substeps: int) -> Plant:
 
 
 def operator(rig: RigFile, plant: Plant, truth: Truth) -> SimulatedOperator:
-    """Who works on it."""
+    """Who works on it. What somebody has left hanging hangs on the hook from the start."""
+    if left := truth.defects["weight_left_kg"]:
+        plant.load(left, left * truth.plant.gravity, 0.0)
     return SimulatedOperator(plant, truth, rig.hook_seat.half_width or 0.0)
 
 
@@ -212,6 +218,8 @@ def places(defects: Mapping[str, float], at: Mapping[str, int]) -> tuple[slice, 
 
 def spoil(values: Array, at: Mapping[str, int], defects: Mapping[str, float]) -> None:
     """Put planted defects of sensors into telemetry (n, signals), and the angle within a turn."""
+    if defects["contact_silent"]:
+        values[:, at["flags"]] = values[:, at["flags"]].astype(np.int64) & ~CONTACT
     values[:, at["i_m1"]] *= defects["segment_sign_1"]
     if defects["stuck_current_yo_p"]:
         values[:, at["i_yo_p"]] = 4.0
