@@ -21,13 +21,15 @@ from procedures.shared.gradients import by_inputs
 from procedures.shared.step_table import StepTable
 
 Array = npt.NDArray[np.float64]
-EARLY_N, EARLY_HALF_N = 0.06, 0.08
-"""An end goes by so much force early: the loop that holds x answers the noise of its probe, and a push of a few milliseconds is
-enough where the ring hardly carries. Within so much more: the ramp's speed, and the ripple of the force (AWAY_N)."""
-AWAY_N = 0.06
-"""What the statics leave out, within so much: ripple, 2.5 % of alpha_d (T 5.25), as the rotor stands anywhere within its
-encoder's count, 0.3 N/A 10 A 16 0.9 mrad = 0.04 N; and a side pull, 0.04 N/A^2 (T Table 5.3) 5 A times 0.2 A of torque current
-and of what segments differ by, 0.04 N."""
+EARLY_N, EARLY_HALF_N = 0.04, 0.03
+"""An end goes by so much force early, within so much more: the loop that holds x answers the noise of its probe, a push of a
+few milliseconds is enough where the ring hardly carries, and the ramp goes on meanwhile."""
+ASIDE_N, ASIDE_SHARE = 0.02, 0.25  # of that, and of the ripple, what differs between the signs of gamma
+RIPPLE = 0.025  # of the force constants (T 5.25), over the rotor's angle
+COUNT_RAD = math.pi / 4096  # half a count of the encoder: the rotor may stand so much further
+AWAY_N = (
+    0.03  # what the statics leave out: a side pull, 0.04 N/A^2 (T Table 5.3) 5 A times what segments differ by, 0.15 A
+)
 WRITE_S = 0.01  # within which a write of gamma acts: a request and its reply
 
 
@@ -65,7 +67,12 @@ def evaluate(recording: Recording[Plan], rest: StepTable[Rest]) -> Analysis:
         predicted, limit, slope = _predicted(machine, low, dwells, held, inputs)
         found |= predicted
     if len(gammas):
-        found |= _angles(gammas, slope, plan)
+        values, half = (
+            {name: e.value for name, e in inputs.items()},
+            float(gammas[:, 1].mean() - gammas[:, 0].mean()) / 2,
+        )
+        off = max(abs(r.turned(k)) for r, k in zip(ramps, lifted, strict=True) if k is not None) + COUNT_RAD
+        found |= _angles(gammas, slope, fit.ripple(values, limit, half + values["gamma_0"], off, RIPPLE), plan)
     return Analysis(rest, dwells, held, ramps, lifted, gammas, found, limit)
 
 
@@ -107,11 +114,13 @@ def _depth(reading: Array, gain: Estimate) -> Estimate:
     return Estimate(float(-reading.mean()), "m", {scatter: 1.0} if u else {}) / gain
 
 
-def _angles(gammas: Array, slope: float, plan: Plan) -> dict[str, Estimate]:
-    """Half difference and mean of both angles, each from what the repeats gave."""
+def _angles(gammas: Array, slope: float, ripple_N: float, plan: Plan) -> dict[str, Estimate]:
+    """Half difference and mean of both angles, each from what the repeats gave; `slope` N/rad."""
     out = {}
     early = Estimate.of(EARLY_N, _bound("lift/early", "motion at the threshold", EARLY_HALF_N, "N"))
-    aside = Estimate.of(0.0, _bound("lift/aside", "motion at the threshold, one way", EARLY_HALF_N / 2, "N"))
+    early = early + Estimate.of(0.0, _bound("lift/ripple", "ripple of the force off the home angle", ripple_N, "N"))
+    half = ASIDE_N + ASIDE_SHARE * ripple_N
+    aside = Estimate.of(0.0, _bound("lift/aside", "motion at the threshold, one way", half, "N"))
     late = Estimate.of(0.0, _bound("lift/write", "when gamma begins to turn", WRITE_S * plan.rate_rad_s, "rad"))
     ways: tuple[tuple[str, Array, Estimate], ...] = (
         ("gamma_lift", (gammas[:, 1] - gammas[:, 0]) / 2, early * (1 / slope) + late if slope > 0 else late),
@@ -157,7 +166,7 @@ def _predicted(
     values = {name: e.value for name, e in inputs.items()}
     slope = fit.thresholds(values, *load(values), limit(values))[2]
     found = by_inputs(model, inputs)
-    away = {name: Estimate.of(0.0, _bound(f"statics/{name}", "ripple and side pull", AWAY_N, "N")) for name in found}
+    away = {name: Estimate.of(0.0, _bound(f"statics/{name}", "side pull", AWAY_N, "N")) for name in found}
     told = {"surplus": _in("N", found["surplus"] + away["surplus"])}
     if slope > 0:  # else it lifts at once, and there is no angle
         told |= {name: _in("rad", found[name] + away[name] * (1 / slope)) for name in found if name != "surplus"}

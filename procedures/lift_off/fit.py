@@ -87,6 +87,17 @@ def surplus(p: Numbers, l_x: float, l_y: float, limit_A: float, gamma: float) ->
     return d * limit_A * math.cos(turn) + c * math.sin(turn) * across - l_y
 
 
+def ripple(p: Numbers, limit_A: float, gamma: float, theta: float, share: float) -> float:
+    """What the ripple of the force may add to the lift, N, if it is `share` of alpha_d and the rotor `theta` rad off home.
+
+    T (5.25): with P = 2 M it turns the forces by alpha_3 P theta. Sideways alpha_3 P theta i_y has i_x answer, which lifts by
+    C sin(turn)/(D cos(turn)) of it, and i_x itself lifts by alpha_3 P theta i_x more: to first order twice the former.
+    """
+    d, c, zero = constants(p)
+    turn = p["pole_pairs"] * gamma - zero
+    return abs(2 * share * d * 2 * p["pole_pairs"] * theta * limit_A * c / d * math.sin(turn))
+
+
 def thresholds(p: Numbers, l_x: float, l_y: float, limit_A: float) -> tuple[float, float, float]:
     """Phase angles below and above from which on the motor lifts, rad, by (3), and how fast the force grows there, N/rad, the
     mean of both. Where there is no root both are where the force is least: it lifts at once."""

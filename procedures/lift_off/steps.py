@@ -81,6 +81,10 @@ class Ramped:
         """By the outboard vertical probe."""
         return self.positions["yo"]
 
+    def turned(self, lifted: int) -> float:
+        """How far the rotor is off its home angle just before the lift, rad, as its encoder reads."""
+        return float(self.angle[max(0, lifted - 100) : lifted].mean())
+
     def before(self, lifted: int, early_s: tuple[float, float] = BEFORE_S) -> dict[str, float]:
         """Mean readings by axis from so long until so long before the sample of the lift: the ring carries hardly anything
         then, and is no longer pressed."""
