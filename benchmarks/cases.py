@@ -19,6 +19,7 @@ RPM = math.pi / 30
 RIGS = {
     "tsbs12": ("amb-calibration", "force-constant", "negative-stiffness", "force-coupling", "torque-constant", "spindown",
                "angle-step", "lift-off", "slew", "force-map"),
+    "tsbs12-drag": ("spindown", "maximum-speed"),
     "amb5dof": ("bearing-model", "step", "tracking", "unbalance", "compensation", "balance", "run-up", "coast-down",
                 "sensitivity"),
     "amb1dof": ("derivative", "estimator-compare"),
@@ -31,7 +32,8 @@ FOREIGN = {
 ENDS: Mapping[str, tuple[Mapping[str, Any], ...]] = {
     "amb-calibration": ({"bias_A": 2.5}, {"bias_A": 4.0}),
     "torque-constant": ({"bias_A": 2.0}, {"bias_A": 4.0}),
-    "spindown": ({"speed_rad_s": 30.0}, {"speed_rad_s": 70.0}),
+    "spindown": ({"speed_rad_s": 30.0}, {"speed_rad_s": 70.0}, {"motor_carries": True, "run_up": "motor"}),
+    "maximum-speed": ({"limit_A": 7.0}, {"limit_A": 8.0}),
     "step": (
         {"speeds_rad_s": (3000 * RPM,)},
         {"speeds_rad_s": (10000 * RPM,)},

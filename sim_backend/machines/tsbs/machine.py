@@ -14,6 +14,7 @@ from bench.rigfile.toleranced import Toleranced
 from sim_backend.machine import Machine, Truth
 from sim_backend.machines.tsbs import liftoff
 from sim_backend.machines.tsbs import quantities as of
+from sim_backend.machines.tsbs.motions import MOTIONS
 from sim_backend.machines.tsbs.operator import SimulatedOperator
 from sim_backend.machines.tsbs.params import ControlParams, PlantParams, beta_of
 from sim_backend.machines.tsbs.plant import CHANNELS, TRACE, Plant
@@ -32,10 +33,12 @@ DEFECTS = {
     "fault_after_s": 0.0, "drive_fault_after_s": 0.0, "exchange_segments": 0.0, "segment_sign_1": 1.0,
     "encoder_sign": 1.0, "lever_slip": 0.0, "segment_scale_drift": 0.0, "drive_brakes": 0.0, "factor_gamma": 1.0,
     "factor_kp_theta": 1.0, "factor_kd_theta": 1.0, "factor_sine_amplitude": 1.0, "factor_angle_ref": 1.0,
-    "factor_segment_max": 1.0, "factor_gamma_slew": 1.0, "ring_friction": 0.1, "contact_silent": 0.0, "weight_left_kg": 0.0,
+    "factor_gamma_slew": 1.0, "ring_friction": 0.1, "contact_silent": 0.0, "weight_left_kg": 0.0,
+    "factor_lag_compensation": 1.0, "factor_segment_max": 1.0, "kept_allocation": 0.0,
 }  # fmt: skip
 """Planted defects and their harmless values. Mass errors are relative; `factor_...` is what the controller makes of a
-parameter, over what it was told; `segment_scale_drift` is relative, 1/s, of all four segments' sensors."""
+parameter, over what it was told; `kept_...` is what it keeps to instead; `segment_scale_drift` is relative, 1/s, of all four
+segments' sensors."""
 
 CONTACT = 4 | 8  # of the flags, inboard and outboard
 
@@ -65,7 +68,8 @@ def stated(rig: RigFile) -> dict[str, Toleranced]:
         out[f"position_gain_{axis}"] = certified.gain if certified else rig.simulation["position_gain"]
         out[f"position_offset_{axis}"] = certified.offset if certified else rig.simulation["position_offset"]
     for k in range(4):
-        out |= {f"segment_gain_{k}": rig.simulation["segment_gain"], f"segment_drift_{k}": rig.simulation["drift"]}
+        out |= {f"segment_gain_{k}": rig.machine["segment_gain"], f"segment_drift_{k}": rig.simulation["drift"]}
+    out["beta_4"] = rig.machine["torque_ripple"]
     out |= {
         name: t
         for name, t in rig.machine.items()
@@ -73,7 +77,7 @@ def stated(rig: RigFile) -> dict[str, Toleranced]:
     }
     for axis in "xy":  # unless the rig file states it for that axis
         out[f"motor_offset_{axis}"] = rig.simulation["motor_offset"]
-    shared = {"drift", "position_gain", "position_offset", "segment_gain", "motor_offset"}
+    shared = {"drift", "position_gain", "position_offset", "motor_offset"}
     return out | {k: t for k, t in rig.simulation.items() if isinstance(t, Toleranced) and k not in shared}
 
 
@@ -232,5 +236,5 @@ TSBS = Machine(
     integral_gains=frozenset(("ki_i", "ki_o", "ki_z", "ki_m")), turns=True,
     channels=CHANNELS, places=places, spoil=spoil,
     supply_V=148.0, windings={"temp_i": 0.0, "temp_o": 2.0, "temp_m": -3.0}, copper_W=copper_W,
-    operator=operator, daily=DAILY, traced=lambda _: TRACE, controls=Plant.settable,
+    operator=operator, daily=DAILY, traced=lambda _: TRACE, controls=Plant.settable, motions=MOTIONS,
 )  # fmt: skip
