@@ -11,9 +11,9 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 
 from bench.calibration import Need
-from bench.errors import Lacking
+from bench.errors import AnalysisError, Lacking
 from bench.figures import Figure
-from bench.findings import Effect, Finding, Findings
+from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
@@ -132,11 +132,15 @@ def _hold(rig: Rig, plan: Plan, record: Recorder, repeat: int, way: int) -> None
 
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
-    """Phase angles and their prediction."""
+    """Phase angles and their prediction.
+
+    Raises:
+        AnalysisError: there is no step at rest.
+    """
     rig, plan, machine = recording.rig, recording.plan, conventions(recording.rig)
     rest = read_table(recording, Rest)
     if rest is None:
-        findings.end(Finding("no-rest", "found no step at rest; was the run stopped early?", "", Effect.ERROR))
+        raise AnalysisError("found no step at rest; expected the run's (was it stopped early?)")
     a = estimates.evaluate(recording, rest)
     touching = tuple(always(recording, kind, machine.contact_outboard) for kind in (Rest, Dwell))
     findings.gate(checks.of_signals(a, machine, (touching[0], touching[1]), plan), checks.FATAL, so_far=a)
