@@ -76,6 +76,8 @@ def test_the_chain_has_what_identifies_the_machine() -> None:
         "spindown",
         "spindown",
         "maximum-speed",
+        "lift-off",
+        "load-balancing",
     ]
     assert set(steps) <= {entry.name for entry in catalogue.PROCEDURES}
 
