@@ -71,7 +71,7 @@ WORDS = {"half": "λ = 1/2", "op": "λ by (6.24)"}
 
 def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
     """Lifted with the angle released: no loop is closed before the encoder's direction is known."""
-    return named(rig, {**dict.fromkeys(BIASES, plan.bias_A), **hold.RELEASED})
+    return {**named(rig, {**dict.fromkeys(BIASES, plan.bias_A), **hold.RELEASED}), **hold.speed_held(rig)}
 
 
 def needs(plan: Plan) -> tuple[Need, ...]:
