@@ -23,6 +23,7 @@ RIGS = {
     "amb5dof": ("bearing-model", "step", "tracking", "unbalance", "compensation", "balance", "run-up", "coast-down",
                 "sensitivity"),
     "amb1dof": ("derivative", "estimator-compare"),
+    "tsbs6": ("amb-calibration", "torque-constant", "spindown", "angle-step", "slew"),
 }  # fmt: skip
 FOREIGN = {
     "examples/vertical-spindle/spindle.toml": ("step", "unbalance", "balance", "run-up", "coast-down"),

@@ -245,6 +245,34 @@ def _compare(done: Simulated) -> Found:
         yield name, where, value
 
 
+def _angle(done: Simulated) -> Found:
+    from procedures.angle_step.procedure import CODES, carried, planned
+    from procedures.servomotor.conventions import conventions
+    from procedures.servomotor.parameters import named, parameter, stated
+    from sim_backend.motion import AngleAsked, AngleCase
+
+    plan: Any = done.recording.plan
+    rig, of = done.recording.rig, done.drawn.machine.motions.angle
+    if of is None:
+        return
+    count = 2 * math.pi / plan.encoder_counts
+    cases = {
+        case.where: AngleCase(
+            named(rig, {"motor.allocation": CODES[case.allocation], "angle.low_pass_hz": case.filter_hz}),
+            case.size, max(plan.band * case.size, 2 * count), case.allocation == "priority",
+        )
+        for case in planned(plan)
+    }  # fmt: skip
+    asked = AngleAsked(
+        _settings(done, named(rig, carried(rig, plan))), named(rig, {"motor.share": 1.0}), parameter(rig, "angle.ref"),
+        stated(rig, "motor.segment_limit").default, cases, plan.settle_s, plan.standstill_s, plan.record_s,
+    )  # fmt: skip
+    outboard, motor = conventions(rig).bearings[1], next(iter(rig.motors), "motor")
+    places = {"peak_outboard": outboard, "peak_motor": motor}
+    for (name, where), value in of(rig, done.drawn, asked).items():
+        yield ("peak", f"{places[name]}, {where}", value) if name in places else (name, where, value)
+
+
 def _maximum_speed(done: Simulated) -> Found:
     from procedures.maximum_speed.plan import HALF, OP
     from procedures.maximum_speed.procedure import WORDS
@@ -287,6 +315,7 @@ TRUTHS: Mapping[str, Callable[[Any], Found]] = {
     "coast-down": _passage,
     "sensitivity": _sensitivity,
     "spindown": _spindown,
+    "angle-step": _angle,
     "maximum-speed": _maximum_speed,
     "derivative": _derivative,
     "estimator-compare": _compare,

@@ -44,8 +44,9 @@ DAILY = frozenset(
 """The weather, and how fast each current sensor drifts."""
 
 
-def stated(rig: RigFile) -> dict[str, Toleranced]:
-    """Every toleranced number of a rig file by its name; one that holds for several sensors once for each."""
+def stated(rig: RigFile, segments: tuple[str, ...] = SEGMENTS) -> dict[str, Toleranced]:
+    """Every toleranced number of a rig file by its name; one that holds for several sensors once for each. `segments` are the
+    readings of the motor's currents."""
     out = {f"geometry.{k}": t for k, t in rig.geometry.items()} | {f"masses.{k}": t for k, t in rig.masses.items()}
     out |= {"hanger": rig.hanger, "mass_density": rig.mass_density, "site.gravity": rig.site.gravity,
             "site.air_density": rig.site.air_density}  # fmt: skip
@@ -55,7 +56,7 @@ def stated(rig: RigFile) -> dict[str, Toleranced]:
             out[f"asymmetry_{b}"] = rig.machine["amb_asymmetry"]
     channel = channels_by_reading(rig)
     currents = [s for s in rig.sensors.values() if s.offset.unit == "A"]
-    for coil in (*COILS, *SEGMENTS):
+    for coil in (*COILS, *segments):
         sensor = rig.sensors.get(channel.get(coil, coil), currents[0])
         out |= {f"{coil}.gain": sensor.gain, f"{coil}.offset": sensor.offset}
     out |= {f"drift_{k}": rig.simulation["drift"] for k in range(len(COILS))}
@@ -81,9 +82,9 @@ def _four(v: Mapping[str, float], a: str, b: str, c: str, d: str) -> tuple[float
     return v[a], v[b], v[c], v[d]
 
 
-def params(v: Mapping[str, float], d: Mapping[str, float]) -> PlantParams:
+def params(v: Mapping[str, float], d: Mapping[str, float], segments: tuple[str, ...] = SEGMENTS) -> PlantParams:
     """The plant that drawn values `v` and planted defects `d` make."""
-    return _sensed(_driven(_carried(v, d), v, d), v, d)
+    return _sensed(_driven(_carried(v, d), v, d), v, d, segments)
 
 
 def _carried(v: Mapping[str, float], d: Mapping[str, float]) -> PlantParams:
@@ -145,7 +146,9 @@ def _driven(plant: PlantParams, v: Mapping[str, float], d: Mapping[str, float]) 
     )
 
 
-def _sensed(plant: PlantParams, v: Mapping[str, float], d: Mapping[str, float]) -> PlantParams:
+def _sensed(
+    plant: PlantParams, v: Mapping[str, float], d: Mapping[str, float], segments: tuple[str, ...]
+) -> PlantParams:
     """The same with its sensors."""
     return replace(
         plant,
@@ -156,8 +159,8 @@ def _sensed(plant: PlantParams, v: Mapping[str, float], d: Mapping[str, float]) 
         current_offset=tuple(v[f"{c}.offset"] for c in COILS),
         current_drift=tuple(v[f"drift_{k}"] for k in range(10)),
         current_noise=v["current_noise"],
-        segment_sense=_four(v, *(f"{c}.gain" for c in SEGMENTS)),
-        segment_offset=_four(v, *(f"{c}.offset" for c in SEGMENTS)),
+        segment_sense=_four(v, *(f"{c}.gain" for c in segments)),
+        segment_offset=_four(v, *(f"{c}.offset" for c in segments)),
         segment_drift=_four(v, *(f"segment_drift_{k}" for k in range(4))),
         segment_scale_drift=d["segment_scale_drift"],
         encoder_sign=d["encoder_sign"],
@@ -191,10 +194,12 @@ def copper_W(plant: Plant) -> float:
     return COIL_OHM * sum(i * i for i in currents[:10]) + SEGMENT_OHM * sum(i * i for i in currents[10:])
 
 
-def places(defects: Mapping[str, float], at: Mapping[str, int]) -> tuple[slice, list[int]]:
+def places(
+    defects: Mapping[str, float], at: Mapping[str, int], channels: tuple[str, ...] = CHANNELS
+) -> tuple[slice, list[int]]:
     """Which channels of the core are told, and where each goes among the signals, with planted wiring defects of the
     current telemetry."""
-    goes = {name: at[name] for name in CHANNELS}
+    goes = {name: at[name] for name in channels}
 
     def exchange(a: str, b: str) -> None:
         goes[a], goes[b] = goes[b], goes[a]
@@ -212,9 +217,9 @@ def places(defects: Mapping[str, float], at: Mapping[str, int]) -> tuple[slice, 
     return slice(None), list(goes.values())
 
 
-def spoil(values: Array, at: Mapping[str, int], defects: Mapping[str, float]) -> None:
-    """Put planted defects of sensors into telemetry (n, signals), and the angle within a turn."""
-    values[:, at["i_m1"]] *= defects["segment_sign_1"]
+def spoil(values: Array, at: Mapping[str, int], defects: Mapping[str, float], first: str = SEGMENTS[0]) -> None:
+    """Put planted defects of sensors into telemetry (n, signals), and the angle within a turn. `first`: one of the segments."""
+    values[:, at[first]] *= defects["segment_sign_1"]
     if defects["stuck_current_yo_p"]:
         values[:, at["i_yo_p"]] = 4.0
     values[:, at["angle"]] = (values[:, at["angle"]] + math.pi) % (2 * math.pi) - math.pi

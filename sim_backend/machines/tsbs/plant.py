@@ -24,6 +24,8 @@ TRACE: Final = (
     *("gamma", "demand_x", "demand_y", "torque_asked", "torque_given", "torque_bound", "lambda", "load_x", "load_y"),
 )
 """Of one tick: what is read, and what the law makes of it, which the amplifiers are told a tick later."""
+SHARED: Final = ("pole_pairs", "phases", "literal_7_6b", "literal_7_13", "literal_7_14", "literal_7_18")
+"""What the controller has of the machine's parameters."""
 _ffi, _lib = open_core(Path(__file__).with_name("tsbs.h"))
 
 
@@ -54,7 +56,7 @@ class Plant(CorePlant):
         state.substeps = substeps
         self._s: Any = state
         fill(self._p, vars(self.params))
-        fill(self._c, vars(control or ControlParams()) | {"pole_pairs": self.params.pole_pairs})
+        fill(self._c, vars(control or ControlParams()) | {name: getattr(self.params, name) for name in SHARED})
         _lib.tsbs_start(self._p, self._c, self._s, seed & (2**64 - 1))
 
     @property
