@@ -18,7 +18,7 @@ from bench.rigfile import load_rig
 RPM = math.pi / 30
 RIGS = {
     "tsbs12": ("amb-calibration", "force-constant", "negative-stiffness", "force-coupling", "torque-constant", "spindown",
-               "angle-step", "slew", "force-map"),
+               "angle-step", "lift-off", "slew", "force-map"),
     "tsbs12-drag": ("maximum-speed",),
     "amb5dof": ("bearing-model", "step", "tracking", "unbalance", "compensation", "balance", "run-up", "coast-down",
                 "sensitivity"),
