@@ -69,7 +69,7 @@ def chain() -> Mapping[str, Measured]:
             if wrong:
                 raise SystemExit(f"{step.procedure}: {wrong}")
             facts[step.procedure] = done.calibration()
-            found |= {m.quantity.name: m for m in done.results if isinstance(m, Measured)}
+            found |= {m.quantity.name: m for m in done.results if isinstance(m, Measured) and not m.where}
     return found
 
 

@@ -84,6 +84,54 @@ class CompareAsked:
 
 
 @dataclass(frozen=True)
+class AngleCase:
+    """Steps of one size, rad: the `settings` written before them, the band of settling, rad, and if the law has a bound."""
+
+    settings: Numbers
+    size: float
+    band: float
+    bounded: bool
+
+
+@dataclass(frozen=True)
+class AngleAsked:
+    """Steps of the angle while the motor carries: `settings` as those of steps, what it `carries` by, the parameter of the
+    `reference`, the limit of a segment, A, cases by how they are named, and the times before, between and after, s."""
+
+    settings: Numbers
+    carries: Numbers
+    reference: str
+    limit: float
+    cases: Mapping[str, AngleCase]
+    settle_s: float
+    standstill_s: float
+    record_s: float
+
+
+@dataclass(frozen=True)
+class DragAsked:
+    """How a shaft coasts: two bias currents of its radial AMBs, A, and whether a motor carries one end of it meanwhile, whose
+    AMB is idle then."""
+
+    bias_A: float
+    bias_high_A: float
+    motor_carries: bool
+
+
+@dataclass(frozen=True)
+class SpeedsAsked:
+    """Runs at the torque limit: `settings` as those of steps; what is written `before` them, one after the other, once the
+    shaft is held; the parameters that choose each of the `sharings`, by its name; the speed reference that guards them, rad/s;
+    for how long each is watched in each direction, s."""
+
+    settings: Numbers
+    before: Sequence[Numbers]
+    sharings: Mapping[str, Numbers]
+    guard: float
+    seconds: float
+
+
+@dataclass(frozen=True)
 class Motions:
     """The truths of motion of one machine; None: it has none of that kind. Each takes the rig and what was drawn for it (a
     `Truth`) first.
@@ -98,7 +146,9 @@ class Motions:
         band: what the watched estimator does, by name and line (an empty text where it is none's).
         compare: what estimators do in the loop, by quantity and name, and ratios of two.
         peak: of settings, an axis' number and a speed, the greatest sensitivity and where, Hz, of the shaft that turns.
-        drag: what stops the shaft that turns freely, by the names of a spindown: B N m s/rad, T_c N m, J_z kg m^2.
+        angle: what steps of the angle show, by quantity and case.
+        drag: what stops the shaft that coasts, by the names of a spindown: B and B_high N m s/rad, T_c N m, J_z kg m^2.
+        speeds: at the torque limit, by sharing: `speed` rad/s, `bound` A of the torque current, `ripple` rad/s.
     """
 
     steps: Callable[[RigFile, Any, StepsAsked], tuple[Any, Mapping[tuple[float, int], Any]]] | None = None
@@ -109,14 +159,17 @@ class Motions:
     loop: Callable[[RigFile, Any, Numbers, Sequence[str]], Any] | None = None
     peak: Callable[[RigFile, Any, Numbers, int, float], tuple[float, float]] | None = None
     compare: Callable[[RigFile, Any, CompareAsked], Mapping[tuple[str, str], float]] | None = None
-    drag: Callable[[Any], Mapping[str, float]] | None = None
+    angle: Callable[[RigFile, Any, AngleAsked], Mapping[tuple[str, str], float]] | None = None
+    drag: Callable[[Any, DragAsked], Mapping[str, float]] | None = None
     band: Callable[[RigFile, Any, BandAsked], Mapping[tuple[str, float | None], float]] | None = None
+    speeds: Callable[[RigFile, Any, SpeedsAsked], Mapping[str, Mapping[str, float]]] | None = None
 
 
 NONE = Motions()
 
 
-def drag(drawn: Any) -> Mapping[str, float]:
+def drag(drawn: Any, asked: DragAsked) -> Mapping[str, float]:
     """Of a plant that nothing but `viscous` and `coulomb` drag stops: J_z w' = -B w - T_c."""
+    del asked
     p = drawn.plant
     return {"B": p.viscous, "T_c": p.coulomb, "J_z": p.polar_inertia}

@@ -98,6 +98,7 @@ def prepare(request: Request, asking: Asking = quietly) -> tuple[Job, Connect]:
         request.allow_expired,
     )
     used = lookup.found(procedure.name, procedure.needs(plan))
+    procedure.refuse_by(rig, plan, used)
     injected = [fault_injection.parse(text) for text in request.faults]
     if seed is None:
         _load_numerics()
@@ -124,7 +125,11 @@ def _load_numerics() -> None:
 def remedy(request: Request, need: Need) -> str:
     """The command lines that make the calibration that a run lacks."""
     fields = load_procedure(need.procedure).plan.model_fields
-    settings = [f"{name}={number(value)}" for name, value in need.settings.items() if name in fields]
+    settings = [
+        f"{name}={str(bool(value)).lower() if fields[name].annotation is bool else number(value)}"
+        for name, value in need.settings.items()
+        if name in fields
+    ]
     words = ["bench", "run", need.procedure, "--rig", request.rig]
     if request.backend == "live":
         words += ["--backend", "live"]

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from sim_backend.motion import Whirl
 
 MARGIN_POINTS = 20000
+TOP_S = 40.0  # for which a speed is watched in each direction
 Found = Iterator[tuple[str, str, float]]  # name, where, value in SI
 
 
@@ -210,8 +211,12 @@ def _sensitivity(done: Simulated) -> Found:
 
 
 def _spindown(done: Simulated) -> Found:
+    from sim_backend.motion import DragAsked
+
+    plan: Any = done.recording.plan
     of = done.drawn.machine.motions.drag
-    yield from ((name, "", value) for name, value in (of(done.drawn) if of is not None else {}).items())
+    asked = DragAsked(plan.bias_A, plan.bias_high_A, plan.motor_carries)
+    yield from ((name, "", value) for name, value in (of(done.drawn, asked) if of is not None else {}).items())
 
 
 def _derivative(done: Simulated) -> Found:
@@ -240,6 +245,66 @@ def _compare(done: Simulated) -> Found:
         yield name, where, value
 
 
+def _angle(done: Simulated) -> Found:
+    from procedures.angle_step.procedure import CODES, carried, planned
+    from procedures.servomotor.conventions import conventions
+    from procedures.servomotor.parameters import named, parameter, stated
+    from sim_backend.motion import AngleAsked, AngleCase
+
+    plan: Any = done.recording.plan
+    rig, of = done.recording.rig, done.drawn.machine.motions.angle
+    if of is None:
+        return
+    count = 2 * math.pi / plan.encoder_counts
+    cases = {
+        case.where: AngleCase(
+            named(rig, {"motor.allocation": CODES[case.allocation], "angle.low_pass_hz": case.filter_hz}),
+            case.size, max(plan.band * case.size, 2 * count), case.allocation == "priority",
+        )
+        for case in planned(plan)
+    }  # fmt: skip
+    asked = AngleAsked(
+        _settings(done, named(rig, carried(rig, plan))), named(rig, {"motor.share": 1.0}), parameter(rig, "angle.ref"),
+        stated(rig, "motor.segment_limit").default, cases, plan.settle_s, plan.standstill_s, plan.record_s,
+    )  # fmt: skip
+    outboard, motor = conventions(rig).bearings[1], next(iter(rig.motors), "motor")
+    places = {"peak_outboard": outboard, "peak_motor": motor}
+    for (name, where), value in of(rig, done.drawn, asked).items():
+        yield ("peak", f"{places[name]}, {where}", value) if name in places else (name, where, value)
+
+
+def _maximum_speed(done: Simulated) -> Found:
+    from procedures.maximum_speed.plan import HALF, OP
+    from procedures.maximum_speed.procedure import WORDS
+    from procedures.maximum_speed.running import guard_of, limit_of
+    from procedures.maximum_speed.steps import SET_POINT
+    from procedures.servomotor.hold import GAINS
+    from procedures.servomotor.parameters import chosen, named, stated
+    from sim_backend.motion import DragAsked, SpeedsAsked
+
+    plan: Any = done.recording.plan
+    rig, of = done.recording.rig, done.drawn.machine.motions
+    held = done.recording.events(SET_POINT)
+    if of.speeds is None or of.drag is None or not held:
+        return
+    before = (
+        named(rig, {key: stated(rig, key).default for key in GAINS}),
+        {**chosen(rig, "sharing", OP), **named(rig, {"motor.share": 1.0})},
+        named(rig, {"motor.ref_along": float(held[0]["at"])}),
+        {**chosen(rig, "commutation", plan.commutation), **named(rig, {"motor.segment_limit": limit_of(rig, plan)}),
+         **chosen(rig, "torque", "limit")},
+    )  # fmt: skip
+    sharings = {s: chosen(rig, "sharing", s) for s in (HALF, OP)}
+    true = of.speeds(rig, done.drawn, SpeedsAsked(_settings(done), before, sharings, guard_of(rig, plan), TOP_S))
+    for s, name in ((HALF, "half"), (OP, "op")):
+        yield f"speed_{name}", "", true[s]["speed"]
+        yield f"predicted_{name}", "", true[s]["speed"]
+        yield "speed_sd", WORDS[name], true[s]["ripple"]
+    yield "ratio", "", true[OP]["speed"] / true[HALF]["speed"]
+    yield "ratio_predicted", "", true[OP]["bound"] / true[HALF]["bound"]
+    yield "torque_slope", "", of.drag(done.drawn, DragAsked(plan.bias_A, plan.bias_A, True))["B"]
+
+
 TRUTHS: Mapping[str, Callable[[Any], Found]] = {
     "step": _step,
     "tracking": _tracking,
@@ -250,6 +315,8 @@ TRUTHS: Mapping[str, Callable[[Any], Found]] = {
     "coast-down": _passage,
     "sensitivity": _sensitivity,
     "spindown": _spindown,
+    "angle-step": _angle,
+    "maximum-speed": _maximum_speed,
     "derivative": _derivative,
     "estimator-compare": _compare,
 }

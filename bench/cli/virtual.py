@@ -114,11 +114,12 @@ def flown(
     """Draw a rig and take it through the machine's part of a run; what ended that early is in it.
 
     Raises:
-        ConfigError: a calibration that is needed is not given, or was made at other settings.
+        ConfigError: a calibration that is needed is not given, was made at other settings, or rules the plan out.
     """
     chosen, file = load_procedure(procedure), load_rig(rig)
     settings = chosen.plan.model_validate({**file.plans.get(procedure, {}), **plan})
     used = given(chosen.needs(settings), calibrations or {})
+    chosen.refuse_by(file, settings, used)
     drawn = draw(file, seed, truth, chosen.settings(file, settings), visit=visit)
     job = Job(chosen.on(file), file, settings, {}, "sim", seed, calibrations=tuple(used), visit=visit)
     supervisor = Supervisor()

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bench.errors import ConfigError, Lacking
+from bench.errors import ConfigError, Lacking, Unfit
 from bench.figures import Shown
 from bench.findings import Ended, Finding, Findings
 from bench.plan import BenchPlan
@@ -19,7 +19,7 @@ from bench.quantity import Measured, Quantity
 from bench.rigfile.aliases import known_as
 
 if TYPE_CHECKING:
-    from bench.calibration import Need
+    from bench.calibration import Calibration, Need
     from bench.procedure.rig import Rig
     from bench.recording import Recording
     from bench.recording.recorder import Recorder
@@ -67,6 +67,10 @@ def _no_needs(_: Any) -> tuple[Need, ...]:
     return ()
 
 
+def _nothing_foreseen(_rig: RigFile, _plan: Any, _facts: Mapping[str, Calibration]) -> Iterable[str]:
+    return ()
+
+
 def _numbers_of(plan: BenchPlan) -> Mapping[str, float]:
     numbers = {name: getattr(plan, name) for name in type(plan).model_fields}
     return {k: float(v) for k, v in numbers.items() if isinstance(v, int | float) and not isinstance(v, bool)}
@@ -97,7 +101,8 @@ class Procedure:
     follows needs. `measured` yields the quantities of it in the order of the report. `figures` come in the order in which
     a specialist looks at them: the first two stand on page 1, and so do its tables.
 
-    `needs` are the calibrations that a run with that plan uses; it reads them with `Recording.calibration`. `facts` is
+    `needs` are the calibrations that a run with that plan uses; it reads them with `Recording.calibration`. `foresees` looks at
+    a plan once these are at hand, by procedure, and names what cannot work by them: still nothing was started. `facts` is
     what `bench adopt` keeps of a run: values by name, None for what `measured` yields. `holds_for` are the settings that these
     facts hold for, by default the plan's numbers; a setting that a need names must be equal in it.
 
@@ -128,6 +133,7 @@ class Procedure:
     steps_on: Callable[[RigFile, Any], int] | None = None
     former_steps: Callable[[Any], int] | None = None
     needs: Callable[[Any], tuple[Need, ...]] = field(default=_no_needs)
+    foresees: Callable[[RigFile, Any, Mapping[str, Calibration]], Iterable[str]] = field(default=_nothing_foreseen)
     facts: Callable[[Any], Mapping[str, Estimate]] | None = None
     holds_for: Callable[[Any], Mapping[str, float]] = field(default=_numbers_of)
     optional: tuple[Quantity, ...] = ()
@@ -137,6 +143,11 @@ class Procedure:
     places: tuple[str, ...] = ()
     kinds: tuple[Quantity, ...] = ()
     method: str = ""  # the report's section: plain paragraphs, parted by empty lines
+
+    def refuse_by(self, rig: RigFile, plan: Any, calibrations: Iterable[Calibration]) -> None:
+        """Raises Unfit if the plan cannot work by what is known of the rig; `calibrations` are those that it needs."""
+        if problems := tuple(self.foresees(rig, plan, {c.procedure: c for c in calibrations})):
+            raise Unfit(problems)
 
     def steps(self, rig: RigFile, plan: Any) -> int:
         """How many steps `acquire` will record on a rig; 0 is unknown."""

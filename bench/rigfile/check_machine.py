@@ -51,6 +51,7 @@ def _all(rig: RigFile) -> Iterator[Found]:
     yield from _numbers(rig, places)
     yield from _channels(rig)
     yield from _axes(rig)
+    yield from _motors(rig)
     yield from _certificates(rig)
     yield from _aliases(rig)
     if rig.customer is not None and rig.laboratory is not None and rig.laboratory.customer:
@@ -132,6 +133,7 @@ def _named(rig: RigFile) -> Iterator[Found]:
     yield from ((f"probes.{p}.channel", probe.channel, "m") for p, probe in rig.probes.items())
     for m, motor in rig.motors.items():
         yield from ((f"motors.{m}.currents", name, "A") for name in motor.currents)
+        yield from ((f"motors.{m}.asked.{key}", name, "A") for key, name in motor.asked.items())
     for e, encoder in rig.encoders.items():
         yield f"encoders.{e}.channel", encoder.channel, "rad" if encoder.measures == "angle" else "m"
     if rig.mark is not None:
@@ -156,6 +158,16 @@ def _axes(rig: RigFile) -> Iterator[Found]:
     needs = [name for name in ("bearings", "probes", "balancing", "hooks") if getattr(rig, name)]
     if needs and rig.shaft is None:
         yield "shaft", "nothing", f'[shaft] with far_end = "NAME": {needs[0]} are placed along it'
+
+
+def _motors(rig: RigFile) -> Iterator[Found]:
+    """Each segment has every component of its current."""
+    for m, motor in rig.motors.items():
+        parts = ", ".join(motor.components)
+        if len(set(motor.components)) < len(motor.components):
+            yield f"motors.{m}.components", parts, "each once"
+        elif len(motor.currents) % len(motor.components):
+            yield f"motors.{m}.currents", f"{len(motor.currents)} of {parts}", "as many of each component"
 
 
 def _certificates(rig: RigFile) -> Iterator[Found]:

@@ -35,7 +35,8 @@ SOME_GEOMETRY = {
 """Lengths that a rig may have; the procedures that need one say so."""
 MACHINE = {"pole_pairs": "1", "polar_inertia": "kg m^2", "ring_inertia": "kg m^2", "amb_asymmetry": "1",
            "radial_axes": "rad", "runout": "m", "coupling_offset": "m", "mass": "kg", "transverse_inertia": "kg m^2",
-           "weight_mass": "kg", "weight_angle": "rad", "drive_drag": "N m"}  # fmt: skip
+           "weight_mass": "kg", "weight_angle": "rad", "drive_drag": "N m",
+           "segment_gain": "1", "torque_ripple": "N m/A"}  # fmt: skip
 
 
 def problems_of(rig: RigFile) -> Iterator[Problem]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
-from procedures.angle_step import steps
+from procedures.angle_step import bounds, steps
 from procedures.angle_step.response import Response, response
 from procedures.angle_step.steps import Case, Done
 from procedures.servomotor.conventions import conventions
@@ -41,7 +41,10 @@ def by_case(moves: list[Done], rig: RigFile, band: float, count_rad: float) -> d
     for case, done in steps.by_case(moves).items():
         within = max(band * case.size, 2 * count_rad)
         responses = tuple(response(d.move, within) for d in done)
-        out[case] = Result(case, responses, _estimates(case, responses, gains, share, count_rad, period))
+        found = _estimates(case, responses, gains, share, count_rad, period)
+        if swings := [d.swing for d in done if d.swing is not None]:
+            found |= bounds.estimates(case.where, swings, rig, case.allocation == "priority")
+        out[case] = Result(case, responses, found)
     return out
 
 

@@ -26,7 +26,7 @@ def all_figures(moves: Sequence[Done], results: Mapping[Case, Result], rig: RigF
         _orbits([first[c] for c in largest], rig.geometry["clearance"].value),
         *(_angles([first[c] for c in cases if c.size == size]) for size in sorted({c.size for c in cases})),
         _radii([first[c] for c in largest]),
-        *(_segments(first[c], limit) for c in largest),
+        *(figure for c in largest for figure in _currents(first[c], limit)),
         *_peaks(results),
     ]
 
@@ -59,6 +59,27 @@ def _radii(moves: Sequence[Done]) -> Figure:
     return Figure("radius", f"Distance off centre, step of {_deg(moves[0])}",
                   "At the outboard sensor, over the time since the step; the line is the greatest at standstill before it.",
                   "time (ms)", "off centre (µm)", series, lines=(("standstill", rest),))  # fmt: skip
+
+
+def _currents(done: Done, limit: float) -> Iterator[Figure]:
+    """The segments' amplitudes; where a capture has them as vectors, the torque current within its bound and their sizes."""
+    swing, name = done.swing, done.case.allocation
+    if swing is None:
+        yield _segments(done, limit)
+        return
+    shown, most = swing.t <= SHOWN_S, 2 * swing.limit
+    t, bound, torque = (x[shown] for x in (1e3 * swing.t, swing.bound, swing.asked["torque"]))
+    cut = "" if name == "priority" else ", shown up to twice the limit"
+    yield Figure(f"torque-{name}", f"Torque current and its bound, {name}, step of {_deg(done)}",
+                 f"What the law asks for{cut}, and what i_x, i_y leave of the limit by T (7.18) put right, at the controller's "
+                 "full rate.", "time (ms)", "current (A)",
+                 (Series("i_θ", t, np.clip(torque, -most, most)), Series("bound", t, bound),
+                  Series("bound, negative", t, -bound)))  # fmt: skip
+    sizes = np.hypot(swing.vectors[:, 0], swing.vectors[:, 1])[:, shown]
+    yield Figure(f"amplitudes-{name}", f"Amplitudes of the segments, {name}, step of {_deg(done)}",
+                 "Measured, √(q² + d²), at the controller's full rate.", "time (ms)", "current (A)",
+                 tuple(Series(f"segment {k + 1}", t, size) for k, size in enumerate(sizes)),
+                 lines=(("limit", swing.limit),))  # fmt: skip
 
 
 def _segments(done: Done, limit: float) -> Figure:

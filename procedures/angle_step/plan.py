@@ -16,6 +16,7 @@ class Plan(BenchPlan):
     """Settings of the angle step, SI."""
 
     steps_rad: tuple[float, ...] = Field((math.radians(2), math.radians(12)), min_length=1)
+    steps_static_rad: tuple[float, ...] = ()  # those with the static one, if others
     allocations: tuple[Allocation, ...] = Field(("static", "priority"), min_length=1)
     filters_hz: tuple[float, ...] = Field((200.0,), min_length=1)  # of the angle's derivative
     repeats: int = Field(3, ge=2)  # each way

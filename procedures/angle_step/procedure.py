@@ -20,7 +20,7 @@ from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from procedures.angle_step import checks, estimates, response
+from procedures.angle_step import bounds, checks, estimates, response
 from procedures.angle_step import figures as drawn
 from procedures.angle_step.estimates import Result
 from procedures.angle_step.plan import Plan
@@ -28,7 +28,6 @@ from procedures.angle_step.response import Loop
 from procedures.angle_step.steps import STEP, Case, Done, cases, channels, positions, read_moves
 from procedures.servomotor import carrying, hold, segments, wiring
 from procedures.servomotor.conventions import conventions
-from procedures.servomotor.direction import of_probe
 from procedures.servomotor.parameters import named, needed, stated, write
 from procedures.shared import assumptions
 
@@ -39,7 +38,10 @@ FINAL = Quantity("final_error", "rad", "angle at the end less its reference")
 PEAK = Quantity("peak", "m", "greatest distance off centre during the step, at the sensor of a bearing or at the motor")
 EXCESS = Quantity("excess", "m", "peak at the outboard sensor above that at standstill", title="excess over standstill")
 SATURATED = Quantity("saturated", "s", "how long an amplifier of the motor cut its demand")
-MEASURES = (RISE, OVERSHOOT, SETTLING, FINAL, PEAK, EXCESS, SATURATED)
+AMPLITUDE = Quantity("amplitude", "A", "greatest current of a segment, q and d together")
+BOUND = Quantity("bound_excess", "A", "greatest torque current beyond what force leaves it, as the law asks for both")
+CAPTURED = (AMPLITUDE, BOUND)
+MEASURES = (RISE, OVERSHOOT, SETTLING, FINAL, PEAK, EXCESS, SATURATED, *CAPTURED)
 TORQUE_CONSTANT = 2.87  # N m/A, T Table 6.2; for predictions before a run, and for nothing that is measured
 NEEDED = (
     "motor.share",
@@ -61,7 +63,11 @@ def settings(rig: RigFile, _: Plan) -> dict[str, float]:
 
 def planned(plan: Plan) -> list[Case]:
     """What is compared, in its order."""
-    return list(cases(plan.steps_rad, plan.allocations, plan.filters_hz))
+    sizes: dict[str, tuple[float, ...]] = {
+        a: plan.steps_static_rad if a == "static" and plan.steps_static_rad else plan.steps_rad
+        for a in plan.allocations
+    }
+    return list(cases(sizes, plan.filters_hz))
 
 
 def step_count(plan: Plan) -> int:
@@ -73,10 +79,9 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Step to and fro for every case; with the outboard AMB in charge again in the end."""
     if not wiring.sound(rig, record):
         return
-    gains = {"angle.kd": plan.kd_theta, "angle.kp": plan.kp_theta, "angle.ki": plan.ki_theta}
-    slew = stated(rig.file, "angle.slew")
-    write(rig, {**gains, "angle.derivative_on_error": 1.0, "angle.slew": slew.high})
+    write(rig, carried(rig.file, plan))
     carrying.carry(rig, plan.settle_s)
+    number = 0
     for case in planned(plan):
         write(rig, {"motor.allocation": CODES[case.allocation], "angle.low_pass_hz": case.filter_hz})
         rig.clock.sleep(plan.standstill_s)
@@ -84,12 +89,36 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
             step = case.size if repeat % 2 == 0 else -case.size
             target = case.size if repeat % 2 == 0 else 0.0
             with record.step(STEP, allocation=case.allocation, size_rad=case.size, filter_hz=case.filter_hz, step_rad=step,
-                             target_rad=target, repeat=repeat):  # fmt: skip
+                             target_rad=target, repeat=repeat, **_numbered(rig.file, number)):  # fmt: skip
                 rig.clock.sleep(plan.standstill_s)
-                write(rig, {"angle.ref": target})
+                _step(rig, target)
                 rig.clock.sleep(plan.record_s)
+            if bounds.captured(rig.file):
+                assert rig.capture is not None
+                rig.capture.wait(5.0)
+                rig.capture.upload(None, number=number)
+            number += 1
     carrying.give_back(rig, 0.2)
-    write(rig, {"angle.slew": slew.default})
+    write(rig, {"angle.slew": stated(rig.file, "angle.slew").default})
+
+
+def carried(rig: RigFile, plan: Plan) -> dict[str, float]:
+    """What the controller is told before the motor carries, by meaning."""
+    gains = {"angle.kd": plan.kd_theta, "angle.kp": plan.kp_theta, "angle.ki": plan.ki_theta}
+    return {**gains, "angle.derivative_on_error": 1.0, "angle.slew": stated(rig, "angle.slew").high}
+
+
+def _numbered(rig: RigFile, number: int) -> dict[str, int]:
+    """By which a move has its capture."""
+    return {"number": number} if bounds.captured(rig) else {}
+
+
+def _step(rig: Rig, target: float) -> None:
+    """The step itself, captured where the controller can."""
+    if names := bounds.captured(rig.file):
+        assert rig.capture is not None
+        rig.capture.arm(names, seconds=bounds.CAPTURED_S)
+    write(rig, {"angle.ref": target})
 
 
 @dataclass(frozen=True)
@@ -104,7 +133,7 @@ class Results:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     """The response of each case."""
-    findings.gate([*of_probe(recording), *segments.of_nudges(recording)])
+    findings.gate(segments.before_carrying(recording))
     plan, rig = recording.plan, recording.rig
     moves = read_moves(recording)
     findings.gate(checks.of_signals(moves, conventions(rig), plan), checks.FATAL)
@@ -135,16 +164,17 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts, and speeds that the envelope does not allow."""
     if len(set(plan.allocations)) < len(plan.allocations) or len(set(plan.filters_hz)) < len(plan.filters_hz):
         yield "allocations, filters_hz: found one twice; expected each once"
-    if any(not 4 * math.pi / plan.encoder_counts < s <= math.pi / 2 for s in plan.steps_rad):
+    sizes = {case.size for case in planned(plan)}
+    if any(not 4 * math.pi / plan.encoder_counts < s <= math.pi / 2 for s in sizes):
         least = 720 / plan.encoder_counts
-        yield f"steps_rad: found {min(plan.steps_rad):g} to {max(plan.steps_rad):g}; expected above two encoder counts " \
+        yield f"steps_rad: found {min(sizes):g} to {max(sizes):g}; expected above two encoder counts " \
               f"({least:.2g} deg), up to a quarter turn"  # fmt: skip
     else:
         yield from _too_fast(rig, plan)
 
 
 def _too_fast(rig: RigFile, plan: Plan) -> Iterator[str]:
-    case = Case("", max(plan.steps_rad), max(plan.filters_hz))
+    case = Case("", max(case.size for case in planned(plan)), max(plan.filters_hz))
     speed = response.fastest(_loop(rig, plan, case), case.size)
     limit = carrying.MARGIN * rig.envelope.max_speed_rad_s
     if speed > limit:
@@ -164,8 +194,9 @@ def requires(rig: RigFile) -> Requires:
         lacks=machine.lacks,
         roles=("levitation", "rotation"),
         channels=(*channels(machine), *wiring.channels(machine)),
-        sensors=positions(machine),
-        parameters=needed(rig, *hold.NEEDED, *wiring.NEEDED, *NEEDED),
+        sensors=(*positions(machine), *(machine.segments if bounds.captured(rig) else ())),
+        parameters=needed(rig, *hold.NEEDED, *wiring.needs(rig), *NEEDED),
+        uses=("capture",) if machine.components == 2 else (),
         machine=("polar_inertia",),
     )
 
@@ -183,7 +214,9 @@ procedure = Procedure(
     requires=requires,
     check=check,
     settings=settings,
+    untold=lambda rig: () if bounds.captured(rig) else CAPTURED,
     step_count=step_count,
+    steps_on=lambda rig, plan: step_count(plan) - wiring.STEPS + wiring.steps(rig),
     reached=("noise/*", "sampling/*"),  # both are read from the recording itself
     assumes=assumptions.ANGLE_STEP,
     method=read_method(__file__),

@@ -23,7 +23,8 @@ TAIL_S = 0.3  # at the end of a record, where the rotor stands again
 class Move:
     """One step. `t` (n,); `angle` (n,) rad; `orbit` and `motor` (2, n) m: x and y off the sensors' zero, at the outboard
     sensor and at the motor; `segments` (4, n) A; `saturated` (n,) where an amplifier cut its demand; `rest_orbit` and
-    `rest_motor` (2, m) m, `rest_segments` (4, m) A of the standstill before. `step` rad is signed."""
+    `rest_motor` (2, m) m, `rest_segments` (4, m) A of the standstill before. `step` rad is signed; `components` of a segment's
+    current: its amplitude, or q and d in turn."""
 
     step: float
     t: Array
@@ -35,6 +36,12 @@ class Move:
     rest_orbit: Array
     rest_motor: Array
     rest_segments: Array
+    components: int = 1
+
+    @property
+    def torque(self) -> tuple[Array, Array]:
+        """Currents (k, n) and (k, m) A along the field, whose mean is the torque current; after the step and before it."""
+        return self.segments[:: self.components], self.rest_segments[:: self.components]
 
 
 @dataclass(frozen=True)
@@ -90,7 +97,7 @@ def response(m: Move, band: float) -> Response:
         towards_motor=towards_motor,
         floor=noise_floor(m.rest_orbit),
         saturated=float(m.saturated.sum()) * period,
-        hold=(float(m.segments[:, tail].mean()), float(m.rest_segments.mean())),
+        hold=(float(m.torque[0][:, tail].mean()), float(m.torque[1].mean())),
         slopes=(low[1], high[1]),
     )
 

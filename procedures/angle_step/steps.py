@@ -12,6 +12,7 @@ import numpy.typing as npt
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
 from bench.rigfile.roles import ANGLE, STATUS
+from procedures.angle_step.bounds import Swing, read_swing
 from procedures.angle_step.response import Move
 from procedures.servomotor.conventions import Servomotor, conventions, displacement
 from procedures.servomotor.parameters import parameter
@@ -47,7 +48,8 @@ class Case:
 
 @dataclass(frozen=True)
 class Done:
-    """One recorded move: its case, the move, its flags ORed, the channels that stood still, and lost samples."""
+    """One recorded move: its case, the move, its flags ORed, the channels that stood still, lost samples, and what was captured
+    of its currents, if anything was."""
 
     case: Case
     move: Move
@@ -56,6 +58,7 @@ class Done:
     stuck: tuple[str, ...]
     lost: int
     expected: int
+    swing: Swing | None = None
 
 
 def read_moves(recording: Recording[Any]) -> list[Done]:
@@ -101,6 +104,7 @@ def _read(recording: Recording[Any], step: Step, machine: Servomotor, share: flo
         tuple(c for c in (*positions(machine), *machine.segments) if np.ptp(data[c]) == 0),
         step.lost(),
         step.expected(),
+        read_swing(recording, labels.get("number")),
     )
 
 
@@ -110,7 +114,7 @@ def _move(
 ) -> Move:  # fmt: skip
     step = float(labels["step_rad"])
     segments = np.array([data[c] for c in machine.segments])
-    torque = segments.mean(axis=0)
+    torque = segments[:: machine.components].mean(axis=0)
     standing = float(torque[rest].mean())
     answers = np.flatnonzero(~rest & (np.abs(torque - standing) > ANSWER_A))
     if not len(answers):
@@ -132,12 +136,12 @@ def _move(
         rest_orbit=outboard[:, rest],
         rest_motor=motor[:, rest],
         rest_segments=segments[:, rest],
+        components=machine.components,
     )
 
 
-def cases(steps: tuple[float, ...], allocations: tuple[str, ...], filters: tuple[float, ...]) -> Iterator[Case]:
-    """In the order in which they are done: small steps first."""
+def cases(steps: Mapping[str, tuple[float, ...]], filters: tuple[float, ...]) -> Iterator[Case]:
+    """Steps by allocation, in the order in which they are done: small ones first."""
     for filter_hz in filters:
-        for size in sorted(steps):
-            for allocation in allocations:
-                yield Case(allocation, size, filter_hz)
+        for size in sorted({size for sizes in steps.values() for size in sizes}):
+            yield from (Case(allocation, size, filter_hz) for allocation, sizes in steps.items() if size in sizes)

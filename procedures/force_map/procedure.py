@@ -33,7 +33,6 @@ from procedures.force_map.plan import Plan
 from procedures.force_map.steps import AtPoint, MapData, channels, positions, read_points
 from procedures.servomotor import carrying, hold, segments, wiring
 from procedures.servomotor.conventions import conventions
-from procedures.servomotor.direction import of_probe
 from procedures.servomotor.facts import of_ends
 from procedures.servomotor.parameters import BIASES, named, needed, write
 from procedures.shared import assumptions
@@ -122,7 +121,7 @@ def _visit(rig: Rig, plan: Plan, record: Recorder, visited: list[Point], turn: i
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> tuple[MapData, Result]:
     """Points and terms."""
-    findings.gate([*of_probe(recording), *segments.of_nudges(recording)])
+    findings.gate(segments.before_carrying(recording))
     plan, rig, data = recording.plan, recording.rig, read_points(recording)
     machine = conventions(rig)
     findings.gate(steps.of_signals(data, machine, plan), ("stuck-channel",))

@@ -36,6 +36,7 @@ from procedures.servomotor.parameters import BIASES, named, needed, stated, writ
 from procedures.servomotor.steps import POSITIONS, channels, read_steps
 from procedures.shared import first_look
 from procedures.shared.step_table import StepTable, record_step
+from procedures.shared.unsupported import of_motors
 
 Array = npt.NDArray[np.float64]
 ALPHA_X = Quantity(
@@ -234,7 +235,7 @@ def requires(rig: RigFile) -> Requires:
     """By the names that the rig's machine has."""
     machine = conventions(rig)
     return Requires(
-        lacks=machine.lacks,
+        lacks=(*machine.lacks, *of_motors(rig)),
         roles=("levitation", "rotation"),
         channels=(*channels(machine), STATUS),
         sensors=(*machine.segments, *machine.coils["yo"], *machine.positions_of(*POSITIONS)),

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from bench.errors import RotorNotArrived
 from bench.procedure.rig import Rig
 from bench.rigfile import RigFile
+from bench.rigfile.capabilities import is_bound as can
 from procedures.servomotor import hold
 from procedures.servomotor.parameters import stated, write
 
@@ -16,6 +17,12 @@ ALPHA_D = 12.1  # N/A, T Table 6.2; likewise
 MARGIN = (
     0.8  # share of a current's limit that a prediction may use: force constants are within 10 %, the rest is control
 )
+
+
+def lacking(rig: RigFile) -> tuple[str, ...]:
+    """What a controller lacks to let the motor carry the outboard end, force first."""
+    needed = ("motor.share", "motor.share_slew", "settings.sharing.priority")
+    return tuple(key for key in needed if not can(rig.capabilities, key))
 
 
 def home(rig: Rig) -> None:

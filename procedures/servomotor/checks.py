@@ -20,6 +20,7 @@ Array = npt.NDArray[np.float64]
 
 FATAL = ("stuck-channel", "segment-sign")
 """Findings after which a fit means nothing and is not attempted."""
+IDLE_A = 0.02  # the mean of four sensors' offsets is less
 UNBALANCED_A = 0.5  # half the sum of opposite segments is the torque current: at rest within 0.1 A
 
 
@@ -66,6 +67,19 @@ def segments(mean: Mapping[str, Array | float], machine: Servomotor) -> Iterator
             "have the wrong sign, or the segments are exchanged.",
             f"{names[0]}, {names[2]}",
             Effect.ERROR,
+        )
+
+
+def idle(coils: Sequence[Mapping[str, float]], machine: Servomotor, where: Sequence[str]) -> Iterator[Finding]:
+    """The outboard AMB while the motor carries its end: mean currents A by coil, of steps that are called `where`."""
+    means = [abs(float(np.mean([of[c] for c in machine.coils_of("xo", "yo")]))) for of in coils]
+    if max(means) > IDLE_A:
+        yield Finding(
+            "not-idle",
+            f"the outboard AMB's coils carry {max(means):.3f} A on average while the motor should carry ({IDLE_A} A allowed): "
+            "the drag is of another state.",
+            where[int(np.argmax(means))],
+            Effect.INDETERMINATE,
         )
 
 

@@ -10,12 +10,13 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import chain
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from bench.rigfile import RigFile
+from bench.rigfile.places import Places
 from bench.rigfile.roles import Status
 from bench.rigfile.supports import Support, SupportedAxis, once_per_rig, two_planes
 from procedures.shared.unsupported import of_weight, unlike
@@ -27,12 +28,18 @@ Value = TypeVar("Value", float, Array)
 @dataclass(frozen=True)
 class Servomotor:
     """Signals by axis: "x" or, upwards, "y" with the bearing, inboard "i" or outboard "o". `coils` has of each axis the one
-    that pulls towards the positive end first. `segments` in the order of T (6.9). `sensors` and `ambs` are the inboard and
-    the outboard lever from the centre of mass, by their names in the rig file's geometry. Then the flags by what they mean."""
+    that pulls towards the positive end first. `segments` are the motor's currents: four amplitudes in the order of T (6.9), or
+    q and d of each half, where it has two segments (T 7), and `components` how many each segment has; `direction` rad is where
+    its first one pushes. `asked`: what a capture calls the currents that the law asks for, "along", "across" and "torque".
+    `sensors` and `ambs` are the inboard and the outboard lever from the centre of mass, by their names in the rig file's
+    geometry. Then the flags by what they mean."""
 
     positions: Mapping[str, str]
     coils: Mapping[str, tuple[str, str]]
     segments: tuple[str, ...]
+    components: int
+    direction: float
+    asked: Mapping[str, str]
     sensors: tuple[str, str]
     ambs: tuple[str, str]
     axes: Mapping[str, str]
@@ -47,6 +54,23 @@ class Servomotor:
     def contact(self) -> int:
         """Contact at either end."""
         return self.contact_inboard | self.contact_outboard
+
+    @property
+    def turning(self) -> tuple[str, ...]:
+        """The currents whose mean is the torque current: those along the field."""
+        return self.segments[:: self.components]
+
+    @property
+    def vectors(self) -> tuple[tuple[str, ...], ...]:
+        """The currents of each segment, q and d, or its amplitude alone."""
+        n = self.components
+        return tuple(self.segments[k : k + n] for k in range(0, len(self.segments), n))
+
+    def pushed(self, x: Value, y: Value) -> tuple[Value, Value]:
+        """A vector by its horizontal and its upward part as the motor has it: across and along its first segment (T 7.6, with
+        the sign of (7.6b) put right)."""
+        c, s = math.cos(self.direction), math.sin(self.direction)
+        return x * c + y * s, y * c - x * s
 
     @property
     def levers(self) -> tuple[str, ...]:
@@ -93,7 +117,7 @@ def conventions(rig: RigFile) -> Servomotor:
     return Servomotor(
         positions={role: axes[role].position for role in ROLES},
         coils={role: (axes[role].coils[0], axes[role].coils[1]) for role in ROLES},
-        segments=next((m.currents for m in rig.motors.values() if "radial force" in m.gives), ()),
+        **_motor(rig),
         sensors=("com_to_inboard_sensor", "com_to_outboard_sensor"),
         ambs=("com_to_inboard_amb", "com_to_outboard_amb"),
         axes={role: axes[role].name for role in ROLES},
@@ -104,6 +128,21 @@ def conventions(rig: RigFile) -> Servomotor:
         contact_outboard=Status.CONTACT_FAR,
         lacks=(*unlike(rig, upright), *of_weight(rig, upright, (0.0, -math.pi / 2))),
     )
+
+
+def _motor(rig: RigFile) -> dict[str, Any]:
+    """The currents of the motor that pushes, what they are, and which way."""
+    name = next((name for name, m in rig.motors.items() if "radial force" in m.gives), None)
+    if name is None:
+        return {"segments": (), "components": 1, "direction": 0.0, "asked": {}}
+    motor, at = rig.motors[name], f"motors/{name}"
+    direction = Places(rig).direction(at).value if motor.direction is not None else 0.0
+    return {
+        "segments": motor.currents,
+        "components": len(motor.components),
+        "direction": direction,
+        "asked": motor.asked,
+    }
 
 
 def _of(plane: Support, end: str) -> Iterator[tuple[str, SupportedAxis]]:
@@ -124,5 +163,6 @@ def displacement(inboard: Array, outboard: Array, share: float) -> Array:
 
 
 def radial_currents(one: Array, two: Array, three: Array, four: Array) -> tuple[Array, Array]:
-    """i_x, i_y in A by the currents of the four segments (T 6.18)."""
+    """i_x, i_y in A by the currents of the four segments (T 6.18), or by q1, d1, q2, d2 of two (T 7.11, 7.12): i_x is
+    (d2 - d1)/2, i_y is (q1 - q2)/2."""
     return (four - two) / 2, (one - three) / 2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -18,9 +19,11 @@ MOVED_RAD = 0.03
 
 @dataclass(frozen=True)
 class Movement:
-    """How far the rotor turned in rad, by which largest torque current in A, and the work of the current on it in A rad."""
+    """How far the rotor turned in rad, `towards` its reference or, negative, away from it; by which largest torque current in
+    A, and the work of the current on it in A rad."""
 
     turned: float
+    towards: float
     driven: float
     work: float
 
@@ -52,13 +55,22 @@ def of_probe(recording: Recording[Any]) -> Iterator[Finding]:
             "encoder has it: it counts backwards, or the motor's currents are reversed.",
             "angle", Effect.ERROR,
         )  # fmt: skip
+    elif moved.towards < -MOVED_RAD:
+        yield Finding(
+            "angle-feedback-sign",
+            f"the rotor turned by {moved.turned:.3f} rad away from its reference, driven by up to {moved.driven:.2f} A: the "
+            "controller answers an angle with the wrong sign, as T (7.14) has it in print.",
+            "angle", Effect.ERROR,
+        )  # fmt: skip
 
 
 def _movement(step: Step, machine: Servomotor) -> Movement | None:
-    data = step.read(ANGLE, *machine.segments)
+    data = step.read(ANGLE, *machine.turning)
     angle = np.unwrap(data[ANGLE])
     if len(angle) < 20:
         return None
-    current = np.mean([data[c] for c in machine.segments], axis=0)
+    current = np.mean([data[c] for c in machine.turning], axis=0)
     work = float(((current[1:] + current[:-1]) / 2 * np.diff(angle)).sum())
-    return Movement(float(np.ptp(angle)), float(np.abs(current).max()), work)
+    wanted = math.remainder(float(step.labels["reference_rad"]) - float(angle[0]), 2 * math.pi)
+    farthest = float(angle[np.argmax(np.abs(angle - angle[0]))] - angle[0])
+    return Movement(float(np.ptp(angle)), math.copysign(1.0, wanted) * farthest, float(np.abs(current).max()), work)

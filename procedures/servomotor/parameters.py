@@ -65,6 +65,18 @@ def named(rig: RigFile, values: Mapping[str, float]) -> dict[str, float]:
     return {parameter(rig, key): value for key, value in values.items()}
 
 
+def chosen(rig: RigFile, kind: str, name: str) -> dict[str, float]:
+    """The parameters that choose a setting, by their names.
+
+    Raises:
+        Lacking: the controller has none of that name.
+    """
+    known = rig.capabilities.settings.get(kind, {})
+    if name not in known:
+        raise Lacking(f"capabilities.settings.{kind}: found no {name}; it has {', '.join(known) or 'none'}")
+    return dict(known[name])
+
+
 def write(rig: Rig, values: Mapping[str, float]) -> None:
     """Write them, in that order; those of one message in one message.
 

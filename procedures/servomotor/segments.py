@@ -12,13 +12,22 @@ from bench.findings import Effect, Finding
 from bench.recording import Recording
 from procedures.servomotor.conventions import Servomotor, conventions
 from procedures.servomotor.conventions import radial_currents as of_segments
+from procedures.servomotor.direction import of_probe
+from procedures.servomotor.leaning import of_leans
 
 Array = npt.NDArray[np.float64]
 FATAL = ("segments-exchanged", "segment-sign", "no-push")
 """Findings after which nothing else is measured."""
-EXPECTED = {"i_y": np.array([1.0, 0.0, -1.0, 0.0]), "i_x": np.array([0.0, -1.0, 0.0, 1.0])}  # (6.9), per A
+EXPECTED = {"i_y": np.array([1.0, 0.0, -1.0, 0.0]), "i_x": np.array([0.0, -1.0, 0.0, 1.0])}  # (6.9); (7.12), per A
 OFF = 0.15  # A per A, share of a segment's current that certificates and amplifiers cannot explain
 LEAST, CROSS = 0.05, 0.3  # A of the outboard AMB per A; cross over own: half a degree of encoder zero makes 8 %
+
+
+def before_carrying(recording: Recording[Any]) -> Iterator[Finding]:
+    """What `wiring.sound` recorded, judged: the encoder's direction, the pushes, and how a frame of its own answers."""
+    yield from of_probe(recording)
+    yield from of_nudges(recording)
+    yield from of_leans(recording)
 
 
 def of_nudges(recording: Recording[Any]) -> Iterator[Finding]:
@@ -35,7 +44,7 @@ def of_nudges(recording: Recording[Any]) -> Iterator[Finding]:
     answers = {name: (means[key][1] - rest) / means[key][0]
                for name, key in (("i_y", (False, True)), ("i_x", (True, False)))}  # fmt: skip
     found = list(_segments(answers, machine))
-    yield from found or _pushes(answers)
+    yield from found or _pushes(answers, machine)
 
 
 def _segments(answers: dict[str, Array], machine: Servomotor) -> Iterator[Finding]:
@@ -46,18 +55,33 @@ def _segments(answers: dict[str, Array], machine: Servomotor) -> Iterator[Findin
         k = int(np.argmax(np.abs(error)))
         yield Finding(
             "segment-sign",
-            f"with 1 A of {name}, segment {k + 1} reads {answer[k]:+.2f} A where (6.9) gives {EXPECTED[name][k]:+.0f} A: its "
-            "current sensor is connected the wrong way round or to another segment, or a force of this axis gives torque "
-            "that the angle's control works against.",
+            f"with 1 A of {name}, {_told(machine, k)} reads {answer[k]:+.2f} A where {_law(machine)} gives "
+            f"{EXPECTED[name][k]:+.0f} A: its current sensor is connected the wrong way round or to another segment, or "
+            "a force of this axis gives torque "
+            f"that the angle's control works against{_or_signs(machine)}.",
             machine.segments[k], Effect.ERROR,
         )  # fmt: skip
         return
 
 
-def _pushes(answers: dict[str, Array]) -> Iterator[Finding]:
+def _told(machine: Servomotor, k: int) -> str:
+    """A segment's current as the finding calls it."""
+    return f"segment {k + 1}" if machine.components == 1 else machine.segments[k]
+
+
+def _law(machine: Servomotor) -> str:
+    return "(6.9)" if machine.components == 1 else "(7.12)"
+
+
+def _or_signs(machine: Servomotor) -> str:
+    return "" if machine.components == 1 else ", or i_y has the signs that T (7.13c), (7.13d) have in print"
+
+
+def _pushes(answers: dict[str, Array], machine: Servomotor) -> Iterator[Finding]:
     for name, own_axis in (("i_y", 1), ("i_x", 0)):
         answer = answers[name][4:]
-        push = np.array([answer[0] - answer[1], answer[2] - answer[3]]) / 2  # outboard AMB, x and y, A per A
+        x, y = (answer[0] - answer[1]) / 2, (answer[2] - answer[3]) / 2  # outboard AMB, A per A
+        push = machine.pushed(x, y)
         own, across = float(push[own_axis]), float(push[1 - own_axis])
         if abs(across) > CROSS * abs(own) and abs(across) > LEAST:
             yield Finding(

@@ -1,7 +1,7 @@
 """Before a loop is closed that a wrong wire would drive into the stops: does the motor turn and push the way it should?
 
 The rotor is levitated by both AMBs and released. Each check moves it a little, records the movement as a step that the
-analysis judges (`direction.of_probe`, `segments.of_nudges`), and says whether to go on.
+analysis judges (`direction.of_probe`, `segments.of_nudges`, `leaning.of_leans`), and says whether to go on.
 """
 
 from __future__ import annotations
@@ -10,8 +10,9 @@ import math
 
 from bench.procedure.rig import Rig
 from bench.recording.recorder import Recorder
+from bench.rigfile import RigFile
 from bench.rigfile.roles import ANGLE
-from procedures.servomotor import hold
+from procedures.servomotor import hold, leaning
 from procedures.servomotor.conventions import Servomotor, conventions
 from procedures.servomotor.parameters import stated, write
 
@@ -22,7 +23,7 @@ LEAST_RAD, LEAST_A = (
     0.03,
     0.05,
 )  # what the analysis calls turned; a sixth of what a sound motor does to the outboard AMB
-STEPS = 4  # that `sound` records
+STEPS = 4  # that `sound` records, and those of `leaning` for a motor with a frame of its own
 
 
 def channels(machine: Servomotor) -> tuple[str, ...]:
@@ -30,8 +31,19 @@ def channels(machine: Servomotor) -> tuple[str, ...]:
     return (ANGLE, *machine.coils_of("xo", "yo"))
 
 
+def needs(rig: RigFile) -> tuple[str, ...]:
+    """What the checks ask the controller for."""
+    return (*NEEDED, *(leaning.NEEDED if leaning.applies(rig) else ()))
+
+
+def steps(rig: RigFile) -> int:
+    """How many steps they record."""
+    return STEPS + (leaning.STEPS if leaning.applies(rig) else 0)
+
+
 def sound(rig: Rig, record: Recorder) -> bool:
-    """Turn the released rotor a little, take up its angle, then push it up and sideways against the AMBs."""
+    """Turn the released rotor a little, take up its angle, then push it along and across its first segment against
+    the AMBs; lean on a motor that has a frame of its own."""
     if _turned(rig, record) < LEAST_RAD:
         write(rig, {"angle.ref": 0.0})
         return False
@@ -43,7 +55,8 @@ def sound(rig: Rig, record: Recorder) -> bool:
     right = _nudged(rig, record, NUDGE_A, 0.0)
     write(rig, dict.fromkeys(NEEDED, 0.0))
     rig.clock.sleep(_ramp_s(rig) + NUDGE_S)
-    return _along(up[1] - rest[1], up[0] - rest[0]) and _along(right[0] - rest[0], right[1] - rest[1])
+    pushed = _along(up[1] - rest[1], up[0] - rest[0]) and _along(right[0] - rest[0], right[1] - rest[1])
+    return pushed and (not leaning.applies(rig.file) or leaning.sound(rig, record))
 
 
 def _turned(rig: Rig, record: Recorder) -> float:
@@ -63,13 +76,13 @@ def _along(own: float, across: float) -> bool:
 
 
 def _nudged(rig: Rig, record: Recorder, i_x: float, i_y: float) -> tuple[float, float]:
-    """The outboard AMB's control currents (x, y) in A with open-loop currents in the motor."""
+    """The outboard AMB's control currents across and along the motor's first segment, A, with open-loop currents in it."""
     write(rig, {"motor.across": i_x, "motor.along": i_y})
     rig.clock.sleep(_ramp_s(rig) + NUDGE_S)
     with record.step("nudge", i_x_A=i_x, i_y_A=i_y):
         rig.clock.sleep(NUDGE_S)
     machine, at = conventions(rig.file), rig.levitation.reading
-    return machine.control("xo", at), machine.control("yo", at)
+    return machine.pushed(machine.control("xo", at), machine.control("yo", at))
 
 
 def _ramp_s(rig: Rig) -> float:

@@ -79,6 +79,17 @@ SLEW = (
     "the errors of tracking by as much of the amplitude. It is found beyond the error that the torque current allows at the "
     "slowest frequency, some 0.2 %.",
 )
+LIFT_OFF = (
+    "Segment current sensors whose readings bend: what is 1 % more at 10 A than at 4 A changes the prediction by 0.1° at 2.5°, "
+    "and more where the angle is smaller; the angle that is measured stays.",
+    "A load that changes between the ring and the hold, such as a weight that is lifted off with the shaft.",
+)
+MAXIMUM_SPEED = (
+    "Time is the controller's: a clock that is fast by 1e-4 makes both speeds slower by that share, and B greater.",
+    "The drag at speed is that of the spindown: heat or a seal that changes B by 1 % since changes the expected speeds by 1 %, "
+    "and hides below the inertia's tolerance; the ratio does not know it.",
+    "What the segments carry within a tick, such as the amplifiers' switching, is not seen.",
+)
 ANGLE_STEP = (
     "A reference that the controller scales is measured as the step that it makes: 1 % of it is 1 % of the step in final_error "
     "and overshoot, and moves settling_time by as long as the angle takes for it. Either end of a step is known to a count of "

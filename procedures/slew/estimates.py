@@ -103,10 +103,10 @@ def _torque_constant(recording: Recording[Plan]) -> Estimate:
 
 def _segment_gain(recording: Recording[Plan]) -> Estimate:
     """One, with what the gains of the segments' current sensors do to the torque current."""
-    out = Estimate.exact(1.0)
-    for channel in (c for c in conventions(recording.rig).segments if c in recording.rig.sensors):
+    out, turning = Estimate.exact(1.0), conventions(recording.rig).turning
+    for channel in (c for c in turning if c in recording.rig.sensors):
         gain = certified_gain(recording.rig, channel)
-        out = out - (gain - gain.value) * 0.25
+        out = out - (gain - gain.value) * (1 / len(turning))
     return out
 
 

@@ -21,7 +21,6 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from procedures.servomotor import carrying, hold, segments, wiring
 from procedures.servomotor.conventions import conventions
-from procedures.servomotor.direction import of_probe
 from procedures.servomotor.parameters import named, needed, stated, write
 from procedures.shared import assumptions
 from procedures.slew import estimates, fit, steps
@@ -91,7 +90,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     """The swings by frequency, and what the slowest says of the torque."""
-    findings.gate([*of_probe(recording), *segments.of_nudges(recording)])
+    findings.gate(segments.before_carrying(recording))
     findings.gate(steps.of_signals(recording), ("stuck-channel",))
     result = estimates.evaluate(recording, read_swings(recording), gains(recording.plan))
     findings.add(estimates.findings(result, recording.plan))
@@ -144,7 +143,7 @@ def requires(rig: RigFile) -> Requires:
         lacks=machine.lacks,
         roles=("levitation", "rotation"),
         channels=(*channels(machine), *wiring.channels(machine)),
-        parameters=needed(rig, *hold.NEEDED, *wiring.NEEDED, *NEEDED, "motor.segment_limit"),
+        parameters=needed(rig, *hold.NEEDED, *wiring.needs(rig), *NEEDED, "motor.segment_limit"),
         machine=("polar_inertia",),
     )
 
@@ -163,6 +162,7 @@ procedure = Procedure(
     check=check,
     settings=settings,
     step_count=step_count,
+    steps_on=lambda rig, plan: step_count(plan) - wiring.STEPS + wiring.steps(rig),
     assumes=assumptions.SLEW,
     method=read_method(__file__),
     needs=needs,

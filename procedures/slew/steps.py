@@ -56,7 +56,7 @@ def _read(recording: Recording[Plan], step: Step) -> Swing:
         float(step.labels["amplitude_rad"]),
         (data["t_ns"] - origin).astype(np.float64) * 1e-9,
         angle - 2 * np.pi * np.round(angle[0] / (2 * np.pi)),
-        np.mean([data[c] for c in machine.segments], axis=0),
+        np.mean([data[c] for c in machine.turning], axis=0),
         seconds(written[0]),
         seconds(answered[0]),
         int(step.labels["periods"]),

@@ -123,6 +123,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
         yield "added_inertia: found true; a ring is mounted where a motor turns the rotor, not on this shaft"
     if plan.run_up == "motor":
         yield "run_up: found motor; the rig file has no device in the role rotation"
+    if plan.motor_carries:
+        yield "motor_carries: found true; there is no motor that could carry an end of the shaft"
 
 
 def requires(rig: RigFile) -> Requires:

@@ -1,8 +1,9 @@
 """Drag of a levitated rotor from its run-downs: B at two bias currents, Coulomb torque and, with a ring, the inertia.
 
 With b and c of `spindown`, B = J b and T_c = J c. The eddy currents' part of B goes with the square of the bearings' flux
-and so with q, the mean over the four radial axes of ((i_p + i_n)/2)^2. The coil currents, freed of their sensors' offset and
-gain, say which q a coast really had; the straight line of B over q through both biases gives B at exactly the nominal ones.
+and so with q, the mean over the radial axes that hold the shaft of ((i_p + i_n)/2)^2. The coil currents, freed of their
+sensors' offset and gain, say which q a coast really had; the straight line of B over q through both biases gives B at exactly
+the nominal ones.
 
 A constant torque of the motor (an offset of its current sensors) brakes one way and drives the other: it drops out of the
 mean over the directions, and half of the difference of c is that torque over J.
@@ -20,9 +21,10 @@ import numpy.typing as npt
 from bench.errors import AnalysisError
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence, propagate
-from procedures.servomotor.conventions import conventions
+from procedures.servomotor.conventions import Servomotor, conventions
 from procedures.shared.certificates import certified, certified_sensors
 from procedures.spindown.fit import Coast, inertia_from_ring
+from procedures.spindown.plan import Plan
 from procedures.spindown.steps import RunDown, coils
 
 Array = npt.NDArray[np.float64]
@@ -99,13 +101,14 @@ def rates(runs: Sequence[RunDown], coast: Callable[[RunDown], Coast]) -> Rates:
     )
 
 
-def evaluate(runs: Sequence[RunDown], rig: RigFile, method: str, bias_A: float, bias_high_A: float) -> Drag:
+def evaluate(runs: Sequence[RunDown], rig: RigFile, method: str, plan: Plan) -> Drag:
     """B, B_high, T_c (and J_z with a ring) by one of METHODS, with all influences.
 
     Raises:
         AnalysisError: a bias or a direction is missing, a run-down is too short for that method, or the ring does not slow the
             decay.
     """
+    bias_A, bias_high_A = plan.bias_A, plan.bias_high_A
     groups = grouped(runs, bias_A)
     if not {"low", "high"} <= groups.keys():
         raise AnalysisError(f"run-downs: found {', '.join(groups)}; expected both biases (was the run stopped early?)")
@@ -117,7 +120,7 @@ def evaluate(runs: Sequence[RunDown], rig: RigFile, method: str, bias_A: float, 
         name: {c: float(np.mean([r.coils[c] for r in members])) for c in members[0].coils}
         for name, members in groups.items()
     }
-    pairs = conventions(rig).coils.values()
+    pairs = held_by(conventions(rig), plan.motor_carries)
 
     def model(p: dict[str, float]) -> dict[str, float]:
         inertia, c = p.get("inertia", 0.0), p["c_low"]
@@ -125,7 +128,7 @@ def evaluate(runs: Sequence[RunDown], rig: RigFile, method: str, bias_A: float, 
         if "ring" in found:
             inertia = out["J_z"] = inertia_from_ring(p["b_low"], p["b_ring"], p["ring"])
             c = (c + (1 + p["ring"] / inertia) * p["c_ring"]) / 2
-        q = {name: _square(currents[name], pairs, p) for name in ("low", "high")}
+        q = {name: square(currents[name], pairs, p) for name in ("low", "high")}
         slope = (p["b_high"] - p["b_low"]) / (q["high"] - q["low"])
         at = {
             k: inertia * (p["b_low"] + slope * (bias**2 - q["low"]))
@@ -177,7 +180,13 @@ def _type_a(group: str, method: str, r: Rates) -> dict[str, Estimate]:
     return {f"b_{group}": b, f"c_{group}": c}
 
 
-def _square(currents: Mapping[str, float], pairs: Collection[tuple[str, str]], p: Mapping[str, float]) -> float:
-    """Mean over the four radial axes of the squared mean current of both coils, A^2, freed of the sensors' errors."""
+def held_by(machine: Servomotor, motor_carries: bool) -> tuple[tuple[str, str], ...]:
+    """The pairs of coils that hold the shaft: of both radial AMBs, or where the motor carries of the inboard one."""
+    return tuple(pair for role, pair in machine.coils.items() if not motor_carries or role.endswith("i"))
+
+
+def square(currents: Mapping[str, float], pairs: Collection[tuple[str, str]], p: Mapping[str, float]) -> float:
+    """Mean over radial axes, by their `pairs` of coils, of the squared mean current of both, A^2, freed of the sensors'
+    errors."""
     true = {c: (i - p[f"offset_{c}"]) / p[f"gain_{c}"] for c, i in currents.items()}
     return math.fsum(((true[one] + true[other]) / 2) ** 2 for one, other in pairs) / len(pairs)

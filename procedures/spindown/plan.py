@@ -18,6 +18,8 @@ class Plan(BenchPlan):
     bias_A: float = Field(3.0, gt=0)
     bias_high_A: float = Field(4.0, gt=0)
     added_inertia: bool = False  # mount the ring and take the inertia from it
+    motor_carries: bool = False  # the outboard end in place of its AMB, which is idle: there is less of what drags
+    settle_s: float = Field(1.0, gt=0)  # after the motor has taken that end
     run_up: Literal["auto", "drive", "motor"] = "auto"  # auto: the drive if the rig has one
     steady_s: float = Field(0.5, ge=0.1)  # at speed before it is let go
     start_delay_s: float = Field(0.1, ge=0)  # for the transient of the speed's filter

@@ -20,9 +20,9 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
-from procedures.servomotor import hold
+from procedures.servomotor import carrying, hold, segments, wiring
 from procedures.servomotor.conventions import conventions
-from procedures.servomotor.parameters import BIASES, named, needed, write
+from procedures.servomotor.parameters import BIASES, chosen, named, needed, write
 from procedures.shared import assumptions
 from procedures.spindown import checks, coasting, estimates
 from procedures.spindown import figures as drawn
@@ -39,6 +39,7 @@ B_HIGH = Quantity(
 T_C = Quantity("T_c", "N m", "Coulomb torque of the rotor alone, mean over the directions that it was turned in")
 J_Z = Quantity("J_z", "kg m^2", "polar inertia: by the ring where one was mounted, else the rig file's as used")
 MEASURES = (B, B_HIGH, T_C, J_Z)
+BY_SPEED, CARRIED = "by the speed channel", "motor carries"
 RAMP_S = 0.25  # what is left of the run-up's ramp when the speed is nearly there
 SLOW = (0.1, 0.15, 0.2, 0.25, 0.3)  # shares of the speed that the drive also holds: they tell its constant torque
 
@@ -59,7 +60,7 @@ def groups(plan: Plan) -> tuple[tuple[str, float], ...]:
 def step_count(plan: Plan) -> int:
     """How many steps `acquire` records, for the progress display; with a drive, once more in each direction, slowly."""
     slowly = 0 if plan.run_up == "motor" else 2 * len(SLOW)
-    return 2 + 4 * plan.repeats * len(groups(plan)) + slowly
+    return 2 + (wiring.STEPS if plan.motor_carries else 0) + 4 * plan.repeats * len(groups(plan)) + slowly
 
 
 def fewest_steps(plan: Plan) -> int:
@@ -74,10 +75,14 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
         coasting.acquire(rig, plan, record)
         return
     hold.probe(rig, record)
+    if plan.motor_carries and not _carries(rig, plan, record):
+        return
     by = "drive" if plan.run_up == "drive" or (plan.run_up == "auto" and rig.drive is not None) else "motor"
+    if by == "motor":
+        rig.levitation.write(hold.speed_held(rig.file))
     for group, bias in groups(plan):
         if group != "low":
-            _at_rest(rig, bias, "ring" if group == "ring" else "")
+            _at_rest(rig, plan, bias, "ring" if group == "ring" else "")
         top = plan.speed_rad_s
         for repeat in range(plan.repeats):
             for direction in (1, -1):
@@ -85,6 +90,8 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
                 top = _run_down(rig, plan, record, labels, top)
                 if not top:
                     return
+    if plan.motor_carries:
+        carrying.give_back(rig, plan.settle_s)
     if plan.added_inertia:
         transition(rig, RigState.READY)
         rig.operator.mount("")
@@ -92,13 +99,27 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     hold.hold(rig)
 
 
-def _at_rest(rig: Rig, bias: float, part: str) -> None:
-    """Land, write the bias and have the part mounted, lift again: both are done at rest only."""
+def _carries(rig: Rig, plan: Plan, record: Recorder) -> bool:
+    """Hand the outboard end to the motor; False where a small push shows that it does not push as it should."""
+    if not wiring.sound(rig, record):
+        return False
+    rig.levitation.write(chosen(rig.file, "sharing", "priority"))
+    carrying.carry(rig, plan.settle_s)
+    hold.release(rig)
+    return True
+
+
+def _at_rest(rig: Rig, plan: Plan, bias: float, part: str) -> None:
+    """Land, write the bias and have the part mounted, lift again: both are done at rest only, on the AMBs."""
+    if plan.motor_carries:
+        carrying.give_back(rig, plan.settle_s)
     transition(rig, RigState.READY)
     write(rig, dict.fromkeys(BIASES, bias))
     if part:
         rig.operator.mount(part)
     transition(rig, RigState.LEVITATED)
+    if plan.motor_carries:
+        carrying.carry(rig, plan.settle_s)
 
 
 def _run_down(rig: Rig, plan: Plan, record: Recorder, labels: Mapping[str, object], top: float) -> float:
@@ -146,17 +167,18 @@ class Analysis:
     angle: Drag
     speed: Drag | None  # where a run-down is too short for the speed's filter
     inertia: Estimate
+    motor_carries: bool = False
 
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis | Coasted:
     """The run-downs, evaluated by the angle and by the speed; where the rig has no motor, as `coasting`."""
     if coasting.applies(recording.rig):
         return coasting.evaluate(recording, findings)
-    findings.gate(checks.before_fits(recording))
+    findings.gate([*checks.before_fits(recording), *segments.of_nudges(recording)])
     plan, rig, runs = recording.plan, recording.rig, read_run_downs(recording)
-    angle = estimates.evaluate(runs, rig, "angle", plan.bias_A, plan.bias_high_A)
+    angle = estimates.evaluate(runs, rig, "angle", plan)
     whole = all(r.of_speed is not None for r in runs)
-    speed = estimates.evaluate(runs, rig, "speed", plan.bias_A, plan.bias_high_A) if whole else None
+    speed = estimates.evaluate(runs, rig, "speed", plan) if whole else None
     findings.add(checks.of_runs(runs, conventions(rig), plan))
     findings.add(checks.of_result(runs, angle, speed, plan))
     findings.add([*checks.of_drive(recording, angle), *checks.of_inertia(rig, angle)])
@@ -164,18 +186,19 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis | Coast
         text = "J_z is the rig file's value, not measured here; B and T_c carry its tolerance. The ring measures it"
         findings.add([Finding("inertia-as-stated", text, "J_z")])
     findings.add([drawn.stopping(runs, angle, plan.speed_rad_s)])
-    return Analysis(runs, angle, speed, _inertia(angle, rig))
+    return Analysis(runs, angle, speed, _inertia(angle, rig), plan.motor_carries)
 
 
 def measured(a: Analysis | Coasted) -> Iterator[Measured]:
     """B and T_c by the speed if it could be fitted, and all quantities by the angle, which are the results."""
+    state = CARRIED if isinstance(a, Analysis) and a.motor_carries else ""
     if isinstance(a, Analysis) and a.speed is not None:
         for quantity in (B, T_C):
-            yield quantity.measured(a.speed.estimates[quantity.name], "by the speed channel")
+            yield quantity.measured(a.speed.estimates[quantity.name], f"{state}, {BY_SPEED}" if state else BY_SPEED)
     estimates = facts(a)
     for quantity in MEASURES:
         if quantity.name in estimates:
-            yield quantity.measured(estimates[quantity.name])
+            yield quantity.measured(estimates[quantity.name], state)
 
 
 def _inertia(result: Drag, rig: RigFile) -> Estimate:
@@ -190,8 +213,8 @@ def facts(a: Analysis | Coasted) -> dict[str, Estimate]:
 
 
 def holds_for(plan: Plan) -> dict[str, float]:
-    """B depends on the bias."""
-    return {"bias_A": plan.bias_A, "bias_high_A": plan.bias_high_A}
+    """B depends on the bias, and on which AMBs have one."""
+    return {"bias_A": plan.bias_A, "bias_high_A": plan.bias_high_A, "motor_carries": float(plan.motor_carries)}
 
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
@@ -213,6 +236,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
         yield f"bias_high_A: found {plan.bias_high_A:g} A; expected at least a tenth off {plan.bias_A:g} A"
     if plan.run_up == "drive" and not any("drive" in d.roles for d in rig.devices.values()):
         yield "run_up: found drive; the rig file has no device in that role"
+    if plan.motor_carries and (lacking := carrying.lacking(rig)):
+        yield f"motor_carries: found true; the controller has no {', '.join(lacking)}"
 
 
 def figures(a: Analysis | Coasted, recording: Recording[Plan]) -> Iterable[Figure]:
@@ -238,7 +263,7 @@ def requires(rig: RigFile) -> Requires:
 
 procedure = Procedure(
     name="spindown",
-    places=("by the speed channel",),
+    places=(BY_SPEED, CARRIED),
     title="Drag of the levitated rotor by spindown",
     measures=MEASURES,
     state=RigState.LEVITATED,

@@ -26,15 +26,15 @@ LOWEST_HZ, FEWEST = 10.0, 100  # below it a rest has too few periods; samples of
 SIDES = 4, 8  # bins beside a line that tell what lies under it; a window of Hann has two
 WIDE = 3.0  # bins about an order that are its own: a window of Hann has two, and a line is not at a bin
 CLEAR = 6.0  # times that, in power: the mean of 16 rests is there once in 1e12, a swing of damping 0.2 has 2
+NEAR = 0.2  # of a pole's size: how far apart two responses put the same one
 MATTERS = 0.5  # of an overshoot's U: less moves nothing that is told
 
 
 def find_hum(steps: Sequence[Done], results: Mapping[Case, Result]) -> Iterator[Finding]:
     """A finding for each group of steps whose overshoot a line at rest moves by more than MATTERS of its U."""
-    poles = np.concatenate(
-        [r.swing.poles for r in results.values() if r.swing is not None] or [np.zeros(0, np.complex128)]
-    )
-    for group, of in by_group(list(steps)).items():
+    groups = by_group(list(steps))
+    poles = np.concatenate([NO_POLES, *(shared_poles([r for c, r in results.items() if c.group == g]) for g in groups)])
+    for group, of in groups.items():
         doubts = [interval(r.estimates["overshoot"]).U * c.size for c, r in results.items()
                   if c.group == group and "overshoot" in r.estimates]  # fmt: skip
         turned = [n * float(np.mean([d.speeds for d in of])) / (2 * np.pi) for n in ORDERS]
@@ -43,6 +43,17 @@ def find_hum(steps: Sequence[Done], results: Mapping[Case, Result]) -> Iterator[
             text = (f"while the shaft rests before the steps its position swings by {amplitude * 1e6:.2g} µm at {hz:.3g} Hz: "
                     "mains hum in probes or cables, or something that shakes the stand; and so do the responses.")  # fmt: skip
             yield Finding("hum", text, group, Effect.INDETERMINATE, touched(of, steps))
+
+
+def shared_poles(results: Sequence[Result]) -> Complex:
+    """Decaying poles, rad/s, that half of the responses of a group show, within NEAR of their size. What fewer show was fitted
+    to their noise: a hill about it hides what lies beside a line, and the loop's own swing was taken for hum."""
+    swings = [r.swing.poles[r.swing.poles.real < 0] for r in results if r.swing is not None]
+    found = np.concatenate([NO_POLES, *swings])
+    if not len(found):
+        return found
+    near = np.stack([(np.abs(found[:, None] - s) < NEAR * np.abs(found[:, None])).any(axis=1) for s in swings])
+    return np.asarray(found[2 * near.sum(axis=0) >= len(swings)])
 
 
 def line(

@@ -40,7 +40,7 @@ def of_signals(data: TorqueData, machine: Servomotor, plan: Plan) -> Iterator[Fi
     yield from signals.flagged(table.flags, _limits(machine), table.where)
     yield from _stuck(data, machine)
     yield from segments(data.steps.segments, machine)
-    yield from wiring(data.wiring)
+    yield from wiring(data.wiring, machine)
     yield from _settled(data, plan)
 
 
@@ -60,11 +60,11 @@ def _stuck(data: TorqueData, machine: Servomotor) -> Iterator[Finding]:
 
 
 def segments(currents: Array, machine: Servomotor) -> Iterator[Finding]:
-    """At home without i_x and i_y all four segments carry the torque current: `currents` (n, 4) A under different loads."""
+    """At home without i_x and i_y all segments carry the torque current: `currents` (n, k) A under different loads."""
     drive = np.median(currents, axis=1)
     drive = drive - drive.mean()
     share = drive @ currents / float(drive @ drive)
-    for k, channel in enumerate(machine.segments):
+    for k, channel in enumerate(machine.turning):
         if share[k] < -0.5:
             yield Finding("segment-sign", f"{channel} reads the torque current with the wrong sign ({share[k]:+.2f} times the "
                           "others). Exchange its sensor's wires.", channel, Effect.ERROR)  # fmt: skip
@@ -73,16 +73,16 @@ def segments(currents: Array, machine: Servomotor) -> Iterator[Finding]:
                           Effect.INDETERMINATE)  # fmt: skip
 
 
-def wiring(seen: Array) -> Iterator[Finding]:
-    """The outboard AMB answers i_x in x and i_y in y, alike; two exchanged segments mix or turn that. `seen` (2, 2): its
-    control currents x, y in A per A of i_x, i_y."""
+def wiring(seen: Array, machine: Servomotor) -> Iterator[Finding]:
+    """The outboard AMB answers i_x across the first segment and i_y along it, alike; two exchanged segments mix or turn that.
+    `seen` (2, 2): its control currents across and along in A per A of i_x, i_y."""
     scale = float(np.abs(seen).sum())
     if scale == 0:
         return
-    misfits = {pair: _misfit(seen, _answer(pair)) for pair in _pairs()}
+    misfits = {pair: _misfit(seen, _answer(pair)) for pair in _pairs(machine)}
     best = min(misfits, key=lambda pair: misfits[pair])
     if best:
-        names = " and ".join(str(k + 1) for k in best)
+        names = " and ".join(str(k // machine.components + 1) for k in best[:2])
         yield Finding(
             "segments-exchanged",
             f"i_x and i_y pull at the outboard AMB as they would with the wires of segments {names} exchanged (misfit "
@@ -93,17 +93,18 @@ def wiring(seen: Array) -> Iterator[Finding]:
                       f"(misfit {misfits[best]:.2f} of 1).", "segments", Effect.INDETERMINATE)  # fmt: skip
 
 
-def _pairs() -> list[tuple[int, ...]]:
+def _pairs(machine: Servomotor) -> list[tuple[int, ...]]:
+    if machine.components == 2:
+        return [(), (0, 2, 1, 3)]
     return [(), *((a, b) for a in range(4) for b in range(a + 1, 4))]
 
 
 def _answer(exchanged: tuple[int, ...]) -> Array:
-    """Effective i_x, i_y over those asked for, (2, 2): T (6.9) with two segments' wires exchanged."""
+    """Effective i_x, i_y over those asked for, (2, 2): T (6.9) with two segments' wires exchanged, each with the next."""
     out = np.zeros((2, 2))
     for column, (ix, iy) in enumerate(((1.0, 0.0), (0.0, 1.0))):
         e = np.array([iy, -ix, -iy, ix])
-        if exchanged:
-            a, b = exchanged
+        for a, b in zip(exchanged[::2], exchanged[1::2], strict=True):
             e[[a, b]] = e[[b, a]]
         out[:, column] = radial_currents(*e)
     return out

@@ -43,8 +43,8 @@ def baseline(data: TorqueData, machine: Servomotor, b: Balance, plan: Plan) -> I
     slope = float(fit.terms[0])
     if abs(slope) <= max(plan.max_baseline_drift_A_s, SIGNIFICANT * float(fit.u[0])):
         return
-    segment = _drifting(data, zero, t, 4 * slope, pairs)
-    channel = "" if segment is None else machine.segments[segment]
+    segment = _drifting(data, zero, t, len(machine.turning) * slope, pairs)
+    channel = "" if segment is None else machine.turning[segment]
     yield Finding(
         "current-drift",
         f"the torque current without load drifts by {slope * 1e3:+.3f} mA/s over the run "
@@ -68,6 +68,9 @@ def _drifting(data: TorqueData, zero: npt.NDArray[np.bool_], t: Array, drift: fl
     seen = np.concatenate([data.table.mean[f"side_{axis}"][zero] for axis in "xy"])
     found = np.linalg.lstsq(design, seen, rcond=None)[0][:2]  # A/s of i_x, i_y
     expected = np.array([[0.0, -drift / 2], [drift / 2, 0.0], [0.0, drift / 2], [-drift / 2, 0.0]])
+    expected = expected[
+        :: len(expected) // data.steps.segments.shape[1]
+    ]  # of q1 and q2 alone where segments are vectors
     apart = np.linalg.norm(expected - found, axis=1)
     best = int(np.argmin(apart))
     return best if apart[best] < 0.3 * abs(drift) else None

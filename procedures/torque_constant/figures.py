@@ -99,7 +99,7 @@ def _one_step(recording: Recording[Plan]) -> Figure:
     """The end of a step close by: over its whole second, which is what is averaged, the swing would be a solid block."""
     heaviest = recording.plan.masses[-1]
     step = next(s for s in recording.steps(OnLever.kind) if s.labels["load"] == heaviest)
-    segments = conventions(recording.rig).segments
+    segments = conventions(recording.rig).turning
     data = recording.read(segments, step.end_ns - round(1e9 * SHOWN_S), step.end_ns)
     t = (data["t_ns"] - step.end_ns).astype(np.float64) * 1e-6
     current = np.mean([data[c] for c in segments], axis=0)

@@ -45,7 +45,7 @@ Ints = npt.NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Steps:
-    """Step means in time order, (n,) each but `segments` (n, 4).
+    """Step means in time order, (n,) each but `segments` (n, k), the k currents along the field.
 
     segments: A, as the current sensors read; angle: rad, of the rotor (`resting`); gamma: rad; time: s, middle of the step
     side: +1 left, -1 right, 0 no load; load: index into the masses, -1 for nothing
@@ -145,9 +145,9 @@ def detent(angle: Array, current: Array, order: float) -> Detent:
 
 
 def torque_current(segments: Array, p: Mapping[str, float]) -> Array:
-    """Mean of the four segments' currents, freed of the gains of their sensors. Offsets are the same at every step: they go
+    """Mean of the currents along the field, freed of the gains of their sensors. Offsets are the same at every step: they go
     into the current without load."""
-    gains = np.array([p[f"gain_{k}"] for k in range(1, 5)])
+    gains = np.array([p[f"gain_{k}"] for k in range(1, segments.shape[1] + 1)])
     out: Array = (segments / gains).mean(axis=1)
     return out
 

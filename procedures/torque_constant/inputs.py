@@ -20,7 +20,7 @@ def fit_inputs(rig: RigFile, masses: Sequence[str]) -> dict[str, Estimate]:
     for side in SIDES:
         name = f"lever_{side}"
         inputs[name] = certified(f"geometry/{name}", rig.geometry[name], f"arm of the lever, {side}")
-    gains = {f"gain_{k}": certified_gain(rig, segment) for k, segment in enumerate(conventions(rig).segments, 1)}
+    gains = {f"gain_{k}": certified_gain(rig, segment) for k, segment in enumerate(conventions(rig).turning, 1)}
     return inputs | certified_masses(rig, masses) | gains
 
 

@@ -135,7 +135,7 @@ def _wiring(rig: Rig, plan: Plan, record: Recorder) -> bool:
             seen.append((Sideways(**asked), answer, rig.clock.now_ns()))
         write(rig, {CURRENTS[name]: 0.0})
     rig.clock.sleep(plan.wiring_A / ramp + min(plan.settle_s, 0.5))
-    return first_look.passes(rig, record, checks.wiring(wiring(of_samples(*zip(*seen, strict=True)))))
+    return first_look.passes(rig, record, checks.wiring(wiring(of_samples(*zip(*seen, strict=True)), machine), machine))
 
 
 def _loads(rig: Rig, plan: Plan, record: Recorder, gamma: float) -> bool:
@@ -151,8 +151,8 @@ def _loads(rig: Rig, plan: Plan, record: Recorder, gamma: float) -> bool:
         hanging = side
         rig.clock.sleep(plan.settle_s)
         with record_step(record, OnLever(gamma, side, load.label)):
-            read = first_look.watched(rig, record, machine.segments, plan.average_s)
-        seen.append([read[name] for name in machine.segments])
+            read = first_look.watched(rig, record, machine.turning, plan.average_s)
+        seen.append([read[name] for name in machine.turning])
         first = gamma == visits(plan)[0] and len(seen) == len(plan.masses) + 2
         if first and not first_look.passes(rig, record, checks.segments(np.array(seen), machine)):
             return False
@@ -191,7 +191,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
 
 def _sideways(recording: Recording[Plan]) -> Iterator[Finding]:
     """What the sideways currents show, read when it is asked for."""
-    yield from checks.wiring(read_wiring(recording))
+    yield from checks.wiring(read_wiring(recording), conventions(recording.rig))
 
 
 def measured(a: Analysis) -> Iterator[Measured]:
@@ -252,7 +252,7 @@ def requires(rig: RigFile) -> Requires:
         lacks=machine.lacks,
         roles=("levitation", "rotation"),
         channels=channels(machine),
-        sensors=machine.segments,
+        sensors=machine.turning,
         parameters=needed(rig, *hold.NEEDED, "motor.phase", "motor.across", "motor.along", "motor.ramp", *BIASES),
         geometry=tuple(f"lever_{s}" for s in SIDES),
         machine=("pole_pairs",),

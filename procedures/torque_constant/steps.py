@@ -62,7 +62,7 @@ class TorqueData:
     control currents as "side_x", "side_y", A.
 
     `detent_angle`, `detent_current` (m,): rad and A without load over a period of the detent.
-    `wiring` (2, 2): control current x, y of the outboard AMB in A per A of i_x, i_y.
+    `wiring` (2, 2): control current of the outboard AMB across and along the motor's first segment, in A per A of i_x, i_y.
     """
 
     steps: Steps
@@ -82,7 +82,7 @@ def read_torques(recording: Recording[Plan]) -> TorqueData:
     masses, table = recording.plan.masses, _table(recording, OnLever)
     if not len(table):
         raise AnalysisError("found no loads on the lever (was the run stopped early?)")
-    segments = conventions(recording.rig).segments
+    segments = conventions(recording.rig).turning
     sides = {"left": 1, "right": -1, "": 0}
     steps = Steps(
         np.ascontiguousarray(table.stack(segments).T),
@@ -109,7 +109,7 @@ def _table(recording: Recording[Plan], kind: type[Read]) -> StepTable[Read]:
         if n < 20:
             raise AnalysisError(f"step {dict(step.labels)}: found {n} samples; expected 20 or more")
         data[ANGLE] = np.unwrap(data[ANGLE])
-        data["torque"] = np.array([data[c] for c in machine.segments]).mean(axis=0)
+        data["torque"] = np.array([data[c] for c in machine.turning]).mean(axis=0)
         data |= {f"side_{axis}": machine.control(f"{axis}o", data.__getitem__) for axis in "xy"}
         return data
 
@@ -119,14 +119,15 @@ def _table(recording: Recording[Plan], kind: type[Read]) -> StepTable[Read]:
 
 def read_wiring(recording: Recording[Plan]) -> Array:
     """The outboard AMB's answers (2, 2) in the steps, A per A."""
-    return wiring(_table(recording, Sideways))
+    return wiring(_table(recording, Sideways), conventions(recording.rig))
 
 
-def wiring(table: StepTable[Sideways]) -> Array:
-    """Slopes of the outboard AMB's control currents over i_x and i_y, from the steps at plus and minus."""
+def wiring(table: StepTable[Sideways], machine: Servomotor) -> Array:
+    """Slopes of the outboard AMB's control currents, across and along the motor's first segment, over i_x and i_y, from the
+    steps at plus and minus."""
     if not len(table):
         return np.zeros((2, 2))
     asked = np.array([[1.0, step.i_x, step.i_y] for step in table.labels])
     answers = np.stack([table.mean["side_x"], table.mean["side_y"]], axis=-1)
     slopes: Array = np.linalg.lstsq(asked, answers, rcond=None)[0][1:].T
-    return slopes
+    return np.array(machine.pushed(slopes[0], slopes[1]))

@@ -81,7 +81,7 @@ class Parameters:
         if control in self._truth.machine.integral_gains:
             value *= defects["integrator_factor"]
         try:
-            self._plant.set(control, value * defects.get(f"factor_{name}", 1.0))
+            self._plant.set(control, defects.get(f"kept_{name}") or value * defects.get(f"factor_{name}", 1.0))
         except KeyError:
             if self._strict:
                 raise

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from bench.cli.compose import Request
+from bench.cli.motion_truth import truth_of_motion
 from bench.cli.run import execute
 from bench.cli.virtual import Simulated, simulated_run
 from bench.errors import AnalysisError
@@ -31,6 +32,12 @@ QUICK = {"repeats": 2, "steady_s": 0.2}
 
 def run_down(folder: Path, seed: int, truth: Mapping[str, float] | None = None, **plan: Any) -> Simulated:
     return simulated_run("spindown", "tsbs12", seed, {**QUICK, **plan}, folder / "recording.mcap", truth)
+
+
+def folder_in(folder: Path) -> Path:
+    made = folder / "other"
+    made.mkdir()
+    return made
 
 
 def results(run: Simulated) -> dict[str, Estimate]:
@@ -175,6 +182,35 @@ def test_a_run_down_of_a_tenth_of_a_second_is_evaluated_by_its_angle(tmp_path: P
         assert u < (2e-3 if name == "T_c" else 2e-3 * e.value), name
 
 
+def test_while_the_motor_carries_the_drag_is_that_of_one_amb(tmp_path: Path) -> None:
+    """60 % of 0.081 N m s/rad are the AMBs', half of which is idle: 0.0567 on the nominal rig, and 0.6 (16/9)/2 + 0.4, 0.0756,
+    at 4 A."""
+    run = run_down(tmp_path, 2026, motor_carries=True, speed_rad_s=50)
+    found = {m.quantity.name: m.estimate for m in run.results if isinstance(m, Measured) and m.where == "motor carries"}
+    true = truth_of_motion(run)
+    assert serious(run) == {}
+    assert true["B"] == pytest.approx(run.truth["B"] * (1 - run.drawn.values["drag_share"] / 2))
+    for name in ("B", "B_high", "T_c"):
+        assert abs(found[name].value - true[name]) < 1.6 * interval(found[name]).U, name
+    assert abs(found["B"].value - run.truth["B"]) > 10 * found["B"].u
+    assert len(run.recording.all_steps()) == run.procedure.step_count(run.recording.plan)
+    assert run.calibration().settings["motor_carries"] == 1.0
+    assert run_down(folder_in(tmp_path), 2026).calibration().settings["motor_carries"] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("defect", "code"),
+    [({"exchange_segments": 1.0}, "segments-exchanged"), ({"segment_drift_1": 0.003}, "not-repeatable")],
+)
+def test_a_motor_that_should_not_carry_is_named(tmp_path: Path, defect: dict[str, float], code: str) -> None:
+    assert code in serious(run_down(tmp_path, 3, defect, motor_carries=True, speed_rad_s=50))
+
+
+def test_a_rig_without_a_motor_cannot_have_it_carry() -> None:
+    (said,) = (x for x in check(load_rig("amb5dof"), Plan(motor_carries=True)) if "motor_carries" in x)
+    assert "no motor" in said
+
+
 def test_a_drive_that_can_do_no_more_lets_go_a_little_below(tmp_path: Path) -> None:
     """70 rad/s take more than its 8 N m at the higher bias: it would trip at its limit, and B_high needs no such speed."""
     run = run_down(tmp_path, 0, speed_rad_s=70)
@@ -209,7 +245,7 @@ def test_a_rig_without_a_drive_is_run_up_by_its_motor_and_lacks_nothing(tmp_path
 def test_what_is_adopted_holds_for_its_biases(sound: Simulated) -> None:
     calibration = sound.calibration()
     assert {"B", "B_high", "T_c", "J_z"} <= set(calibration.values)
-    assert calibration.settings == {"bias_A": 3.0, "bias_high_A": 4.0}
+    assert calibration.settings == {"bias_A": 3.0, "bias_high_A": 4.0, "motor_carries": 0.0}
 
 
 @pytest.mark.parametrize(

@@ -41,14 +41,14 @@ def sound() -> list[RunDown]:
 
 def codes(runs: list[RunDown]) -> set[str]:
     rig, plan = load_rig("tsbs12"), Plan()
-    angle, speed = (estimates.evaluate(runs, rig, m, 3.0, 4.0) for m in ("angle", "speed"))
+    angle, speed = (estimates.evaluate(runs, rig, m, Plan()) for m in ("angle", "speed"))
     found = [*checks.of_runs(runs, MACHINE, plan), *checks.of_result(runs, angle, speed, plan)]
     return {f.code for f in found if f.effect is not Effect.NOTE}
 
 
 def test_sound_run_downs_are_sound() -> None:
     assert codes(sound()) == set()
-    found = estimates.evaluate(sound(), load_rig("tsbs12"), "angle", 3.0, 4.0).estimates
+    found = estimates.evaluate(sound(), load_rig("tsbs12"), "angle", Plan()).estimates
     assert found["B"].value == pytest.approx(0.081, rel=1e-3)
     assert found["B_high"].value == pytest.approx(0.13, rel=1e-3)
     assert found["T_c"].value == pytest.approx(0.05 - 0.005, rel=0.01)  # less the drag that the rig file states
@@ -61,7 +61,7 @@ def test_a_speed_of_another_scale_is_told() -> None:
 
 def test_a_constant_torque_drops_out_and_is_told() -> None:
     runs = [made(r.bias_A, r.direction, r.repeat, extra=-r.direction * 0.03 / J) for r in sound()]
-    found = estimates.evaluate(runs, load_rig("tsbs12"), "angle", 3.0, 4.0)
+    found = estimates.evaluate(runs, load_rig("tsbs12"), "angle", Plan())
     assert found.seen.value == pytest.approx(0.05, rel=0.02)
     assert found.torque.value == pytest.approx(0.03, rel=0.02)
     assert "constant-torque" in codes(runs)
@@ -75,8 +75,8 @@ def test_a_decay_that_depends_on_the_direction_is_told() -> None:
 def test_repeats_that_differ_are_told() -> None:
     runs = [r if r.repeat == 0 else made(r.bias_A, r.direction, 1, b=1.05 * r.of_angle.b) for r in sound()]
     assert "not-repeatable" in codes(runs)
-    wide = estimates.evaluate(runs, load_rig("tsbs12"), "angle", 3.0, 4.0).estimates["B"]
-    assert wide.u > 1.3 * estimates.evaluate(sound(), load_rig("tsbs12"), "angle", 3.0, 4.0).estimates["B"].u
+    wide = estimates.evaluate(runs, load_rig("tsbs12"), "angle", Plan()).estimates["B"]
+    assert wide.u > 1.3 * estimates.evaluate(sound(), load_rig("tsbs12"), "angle", Plan()).estimates["B"].u
 
 
 def test_current_in_a_released_motor_is_told() -> None:
@@ -88,8 +88,8 @@ def test_the_bias_is_what_the_currents_say() -> None:
     """Both sensors of an axis 1 % high: the true bias is lower, and B at exactly 3 A is higher than what coasted."""
     rig = load_rig("tsbs12")
     runs = [replace(r, coils={c: i * 1.01 for c, i in r.coils.items()}) for r in sound()]
-    as_read = estimates.evaluate(runs, rig, "angle", 3.0, 4.0).estimates["B"].value
-    assert as_read < estimates.evaluate(sound(), rig, "angle", 3.0, 4.0).estimates["B"].value
+    as_read = estimates.evaluate(runs, rig, "angle", Plan()).estimates["B"].value
+    assert as_read < estimates.evaluate(sound(), rig, "angle", Plan()).estimates["B"].value
 
 
 @pytest.mark.parametrize("motor", [0.0, 0.009, -0.02])

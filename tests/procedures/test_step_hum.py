@@ -10,7 +10,11 @@ from scipy import signal
 
 from bench.cli.virtual import simulated_run
 from bench.findings import Finding
-from procedures.step.hum import line
+from procedures.step.estimates import Result
+from procedures.step.hum import line, shared_poles
+from procedures.step.oscillation import Swing
+from procedures.step.settling import Settling
+from procedures.step.steps import Case
 
 PERIOD = 5e-4
 Rest = np.ndarray[tuple[int], np.dtype[np.float64]]
@@ -49,6 +53,22 @@ def test_the_swing_of_a_loop_that_is_hardly_damped_is_no_line(damping: float) ->
     hz, amplitude = line(rests(2e-7, hz=40, damping=damping), PERIOD, pole)
     assert hz == pytest.approx(50, abs=2)
     assert amplitude == pytest.approx(2e-7, rel=0.2)
+
+
+def response(*poles: complex) -> Result:
+    """Of one case; the hum asks for no more of it than its poles."""
+    swing = Swing(np.array(poles), np.ones(len(poles), np.complex128), 1.0, 0.0, 0.0)
+    return Result(Case("A", 0.0, "y", 1e-5, 1), (), swing, Settling(0.01, 0.02, np.zeros(0)), 0.0, {})
+
+
+def test_poles_that_one_response_alone_shows_are_its_noise() -> None:
+    """Of seed 28 of amb5dof, steps along y alone: four responses, each with a second pole fitted to noise. By the hill of the
+    loop's own swing beside it, at 98 Hz, its noise at 70 Hz was called hum."""
+    fitted = [(-95 + 419j, -11 + 614j), (-95 + 421j, -5 + 285j), (-95 + 422j, 23 + 443j), (-95 + 421j, 56 + 551j)]
+    found = shared_poles([response(*poles) for poles in fitted])
+    assert found.tolist() == [poles[0] for poles in fitted]
+    assert shared_poles([response(*fitted[0])]).tolist() == list(fitted[0])
+    assert not len(shared_poles([]))
 
 
 def test_what_turns_with_the_shaft_is_no_line_and_hum_beside_it_is_one() -> None:

@@ -1,4 +1,4 @@
-"""The motor's law: torque at its limit (T 6.7.2), lift by the motor (T 6.7.2), load balancing (T 6.7.3), six phases (T 7)."""
+"""The motor's law: torque at its limit (T 6.7.2), lift by the motor (T 6.7.2), load balancing (T 6.7.3)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ import pytest
 from sim_plants import centred, levitated
 
 from sim_backend.core import LAND, LEVITATE, LIFT, READY
-from sim_backend.machines.tsbs import plant as tsbs_core
 from sim_backend.machines.tsbs.params import ControlParams, PlantParams
 from sim_backend.machines.tsbs.plant import CHANNELS, Plant
 
@@ -165,43 +164,3 @@ def test_the_observed_load_is_the_static_one() -> None:
     _, _, plant = balanced(91e-6, circle_radius=0.0)
     law = plant._s.law
     assert list(law.load) == pytest.approx([22.07, -48.55], abs=0.4)
-
-
-def six(ix: float, iy: float, turn: float, allocation: float = 3.0, most: float = 10.0) -> tuple[Array, list[float]]:
-    """Segment currents (4,) along + j across and what the law tells of them, with open-loop i_x, i_y in the law's own frame."""
-    gains = {"kp_theta": turn, "kd_theta": 0.0, "ki_theta": 1e-9, "angle_slew": 1e5, "angle_ref": 1.0}
-    control, state = tsbs_core._ffi.new("tsbs_control *"), tsbs_core._ffi.new("tsbs_law_state *")
-    reading, out = tsbs_core._ffi.new("tsbs_reading *"), tsbs_core._ffi.new("tsbs_reference *")
-    settings = ControlParams(i_x=ix, i_y=iy, i_ramp=1e9, allocation=allocation, segment_max=most, **gains)
-    tsbs_core.fill(control, vars(settings))
-    state.mode = LEVITATE
-    tsbs_core._lib.tsbs_law(control, state, reading, out)
-    return np.array(list(out.segment)) + 1j * np.array(list(out.across)), list(state.told)
-
-
-def test_six_phases_by_hand() -> None:
-    """(7.12) i_q1 = i_t + i_y, i_q2 = i_t - i_y, i_d1 = -i_x, i_d2 = i_x; i_x 6, i_y 4, I_s 10: bound sqrt(64) - 4 = 4 A."""
-    found, told = six(6.0, 4.0, 30.0)
-    np.testing.assert_allclose(found, [8 - 6j, 8 - 6j, 6j, 6j], atol=1e-9)
-    assert told == pytest.approx([6.0, 4.0, 30.0, 4.0, 4.0, 0.5], rel=1e-6)
-    assert six(6.0, 9.0, 5.0)[1][4] == pytest.approx(0.0, abs=1e-12)  # printed (7.18) grants 1 A here
-    found, _ = six(6.0, 9.0, 30.0, allocation=4.0)
-    assert np.abs(found) == pytest.approx(np.full(4, 10.0))
-
-
-def test_six_phases_hold_and_step_without_a_trace_in_the_orbit() -> None:
-    """The motor carries with the frame turned by 45 degrees; 15 degrees leave 1 um with priority, 50 um without."""
-    peaks = {}
-    for allocation in (3.0, 4.0):
-        plant = levitated(centred())
-        step = {"angle_slew": 1000.0, "derivative_on_error": 1.0, "angle_hz": 1000.0, "kd_theta": 0.5, "ki_theta": 50.0}
-        for name, value in (step | {"allocation": allocation, "motor_share": 1.0}).items():
-            plant.set(name, value)
-        plant.run(20000)
-        plant.set("angle_ref", math.radians(15.0))
-        rows = plant.run(5000)
-        assert plant.trips == 0
-        assert rows[-1, COLUMN["angle"]] == pytest.approx(math.radians(15.0), abs=5e-3)
-        peaks[allocation] = np.hypot(rows[:, COLUMN["pos_xo"]], rows[:, COLUMN["pos_yo"]]).max()
-    assert peaks[3.0] < 2e-6
-    assert peaks[4.0] > 5e-5

@@ -6,6 +6,15 @@
 
 static double plane(const double *s, double z, int axis) { return axis ? s[1] - z * s[3] : s[0] + z * s[4]; }
 
+/* a segment's current along the field as the sensors have it, and across it */
+static double along(const tsbs_derived *d, const tsbs_state *st, int k) {
+    return st->segment[k] * d->sensed_c + st->segment[k + 4] * d->sensed_s;
+}
+
+static double across(const tsbs_derived *d, const tsbs_state *st, int k) {
+    return st->segment[k + 4] * d->sensed_c - st->segment[k] * d->sensed_s;
+}
+
 void tsbs_sense(const tsbs_params *p, tsbs_derived *d, tsbs_state *st, tsbs_reading *r, double *coil, double *segment) {
     const double *s = st->s;
     double raw[5], tc[4], ts[4];
@@ -40,8 +49,8 @@ void tsbs_sense(const tsbs_params *p, tsbs_derived *d, tsbs_state *st, tsbs_read
     d->sensed_s = field.turn_s;
     for (int k = 0; k < 4; k++) {
         double noise = p->current_noise * normal[15 + k];
-        double along = st->segment[k] * field.turn_c + st->segment[k + 4] * field.turn_s;
-        double i = scale * p->segment_sense[k] * along + p->segment_offset[k] + p->segment_drift[k] * now + noise;
+        double of = p->phases == 6 && k % 2 ? across(d, st, k - 1) : along(d, st, k);
+        double i = scale * p->segment_sense[k] * of + p->segment_offset[k] + p->segment_drift[k] * now + noise;
         segment[k] = quantise(i, p->current_lsb, d->per_current_lsb);
     }
     double angle = p->encoder_sign * (s[5] + p->encoder_offset);
@@ -69,10 +78,13 @@ static void amplifiers(const tsbs_params *p, const tsbs_derived *d, tsbs_state *
     for (int k = 0; k < 4; k++) {
         const tsbs_reference *r = &st->applied;
         double whole = size(r, k), part = whole > p->segment_limit ? p->segment_limit / whole : 1;
-        double error = p->segment_offset[k] + p->segment_drift[k] * now, per = enabled ? d->per_sense[k] * per_scale : 0;
-        double along = (r->segment[k] * part - error) * per, across = r->across[k] * part * per;
-        segment[k] = along * r->turn_c - across * r->turn_s;
-        segment[k + 4] = along * r->turn_s + across * r->turn_c;
+        int q = p->phases == 6 ? k - k % 2 : k; /* six: sensors 0, 2 of q and 1, 3 of d, each of a pair */
+        double error = p->segment_offset[q] + p->segment_drift[q] * now, per = enabled ? d->per_sense[q] * per_scale : 0;
+        double i_q = (r->segment[k] * part - error) * per, i_d = r->across[k] * part;
+        if (p->phases == 6) i_d -= p->segment_offset[q + 1] + p->segment_drift[q + 1] * now;
+        i_d *= p->phases == 6 ? (enabled ? d->per_sense[q + 1] * per_scale : 0) : per;
+        segment[k] = i_q * r->turn_c - i_d * r->turn_s;
+        segment[k + 4] = i_q * r->turn_s + i_d * r->turn_c;
     }
 }
 
@@ -185,8 +197,7 @@ static void record(const tsbs_params *p, const tsbs_derived *d, tsbs_state *st, 
     out[6] = st->speed;
     memcpy(out + 7, segment, 4 * sizeof *segment);
     for (int k = 0; k < 4; k++) {
-        double across = st->segment[k + 4] * d->sensed_c - st->segment[k] * d->sensed_s;
-        double i = scale * p->segment_sense[k] * across + p->current_noise * normal[k];
+        double i = scale * p->segment_sense[k] * across(d, st, k) + p->current_noise * normal[k];
         out[11 + k] = quantise(i, p->current_lsb, d->per_current_lsb);
     }
     out[15] = l->gamma;

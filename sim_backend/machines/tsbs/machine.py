@@ -12,9 +12,11 @@ import numpy.typing as npt
 from bench.rigfile import RigFile
 from bench.rigfile.toleranced import Toleranced
 from sim_backend.machine import Machine, Truth
+from sim_backend.machines.tsbs import liftoff
 from sim_backend.machines.tsbs import quantities as of
+from sim_backend.machines.tsbs.motions import MOTIONS
 from sim_backend.machines.tsbs.operator import SimulatedOperator
-from sim_backend.machines.tsbs.params import PlantParams, beta_of
+from sim_backend.machines.tsbs.params import ControlParams, PlantParams, beta_of
 from sim_backend.machines.tsbs.plant import CHANNELS, TRACE, Plant
 from sim_backend.spoken import channels_by_reading
 
@@ -31,9 +33,14 @@ DEFECTS = {
     "fault_after_s": 0.0, "drive_fault_after_s": 0.0, "exchange_segments": 0.0, "segment_sign_1": 1.0,
     "encoder_sign": 1.0, "lever_slip": 0.0, "segment_scale_drift": 0.0, "drive_brakes": 0.0, "factor_gamma": 1.0,
     "factor_kp_theta": 1.0, "factor_kd_theta": 1.0, "factor_sine_amplitude": 1.0, "factor_angle_ref": 1.0,
+    "factor_gamma_slew": 1.0, "ring_friction": 0.1, "contact_silent": 0.0, "weight_left_kg": 0.0,
+    "factor_lag_compensation": 1.0, "factor_segment_max": 1.0, "kept_allocation": 0.0,
 }  # fmt: skip
 """Planted defects and their harmless values. Mass errors are relative; `factor_...` is what the controller makes of a
-parameter, over what it was told; `segment_scale_drift` is relative, 1/s, of all four segments' sensors."""
+parameter, over what it was told; `kept_...` is what it keeps to instead; `segment_scale_drift` is relative, 1/s, of all four
+segments' sensors."""
+
+CONTACT = 4 | 8  # of the flags, inboard and outboard
 
 DAILY = frozenset(
     ("site.air_density", *(f"drift_{k}" for k in range(len(COILS))), *(f"segment_drift_{k}" for k in range(4)))
@@ -41,8 +48,9 @@ DAILY = frozenset(
 """The weather, and how fast each current sensor drifts."""
 
 
-def stated(rig: RigFile) -> dict[str, Toleranced]:
-    """Every toleranced number of a rig file by its name; one that holds for several sensors once for each."""
+def stated(rig: RigFile, segments: tuple[str, ...] = SEGMENTS) -> dict[str, Toleranced]:
+    """Every toleranced number of a rig file by its name; one that holds for several sensors once for each. `segments` are the
+    readings of the motor's currents."""
     out = {f"geometry.{k}": t for k, t in rig.geometry.items()} | {f"masses.{k}": t for k, t in rig.masses.items()}
     out |= {"hanger": rig.hanger, "mass_density": rig.mass_density, "site.gravity": rig.site.gravity,
             "site.air_density": rig.site.air_density}  # fmt: skip
@@ -52,7 +60,7 @@ def stated(rig: RigFile) -> dict[str, Toleranced]:
             out[f"asymmetry_{b}"] = rig.machine["amb_asymmetry"]
     channel = channels_by_reading(rig)
     currents = [s for s in rig.sensors.values() if s.offset.unit == "A"]
-    for coil in (*COILS, *SEGMENTS):
+    for coil in (*COILS, *segments):
         sensor = rig.sensors.get(channel.get(coil, coil), currents[0])
         out |= {f"{coil}.gain": sensor.gain, f"{coil}.offset": sensor.offset}
     out |= {f"drift_{k}": rig.simulation["drift"] for k in range(len(COILS))}
@@ -61,7 +69,8 @@ def stated(rig: RigFile) -> dict[str, Toleranced]:
         out[f"position_gain_{axis}"] = certified.gain if certified else rig.simulation["position_gain"]
         out[f"position_offset_{axis}"] = certified.offset if certified else rig.simulation["position_offset"]
     for k in range(4):
-        out |= {f"segment_gain_{k}": rig.simulation["segment_gain"], f"segment_drift_{k}": rig.simulation["drift"]}
+        out |= {f"segment_gain_{k}": rig.machine["segment_gain"], f"segment_drift_{k}": rig.simulation["drift"]}
+    out["beta_4"] = rig.machine["torque_ripple"]
     out |= {
         name: t
         for name, t in rig.machine.items()
@@ -69,7 +78,7 @@ def stated(rig: RigFile) -> dict[str, Toleranced]:
     }
     for axis in "xy":  # unless the rig file states it for that axis
         out[f"motor_offset_{axis}"] = rig.simulation["motor_offset"]
-    shared = {"drift", "position_gain", "position_offset", "segment_gain", "motor_offset"}
+    shared = {"drift", "position_gain", "position_offset", "motor_offset"}
     return out | {k: t for k, t in rig.simulation.items() if isinstance(t, Toleranced) and k not in shared}
 
 
@@ -77,9 +86,9 @@ def _four(v: Mapping[str, float], a: str, b: str, c: str, d: str) -> tuple[float
     return v[a], v[b], v[c], v[d]
 
 
-def params(v: Mapping[str, float], d: Mapping[str, float]) -> PlantParams:
+def params(v: Mapping[str, float], d: Mapping[str, float], segments: tuple[str, ...] = SEGMENTS) -> PlantParams:
     """The plant that drawn values `v` and planted defects `d` make."""
-    return _sensed(_driven(_carried(v, d), v, d), v, d)
+    return _sensed(_driven(_carried(v, d), v, d), v, d, segments)
 
 
 def _carried(v: Mapping[str, float], d: Mapping[str, float]) -> PlantParams:
@@ -110,6 +119,7 @@ def _carried(v: Mapping[str, float], d: Mapping[str, float]) -> PlantParams:
         brake=v.get("drive_drag", 0.0) + d["drive_brakes"],
         lever_slip=d["lever_slip"],
         clearance=v["geometry.clearance"],
+        ring_friction=d["ring_friction"],
         coil_limit=tuple(limit),
         lost_radius=0.92 * v["geometry.clearance"],
     )
@@ -141,7 +151,9 @@ def _driven(plant: PlantParams, v: Mapping[str, float], d: Mapping[str, float]) 
     )
 
 
-def _sensed(plant: PlantParams, v: Mapping[str, float], d: Mapping[str, float]) -> PlantParams:
+def _sensed(
+    plant: PlantParams, v: Mapping[str, float], d: Mapping[str, float], segments: tuple[str, ...]
+) -> PlantParams:
     """The same with its sensors."""
     return replace(
         plant,
@@ -152,8 +164,8 @@ def _sensed(plant: PlantParams, v: Mapping[str, float], d: Mapping[str, float]) 
         current_offset=tuple(v[f"{c}.offset"] for c in COILS),
         current_drift=tuple(v[f"drift_{k}"] for k in range(10)),
         current_noise=v["current_noise"],
-        segment_sense=_four(v, *(f"{c}.gain" for c in SEGMENTS)),
-        segment_offset=_four(v, *(f"{c}.offset" for c in SEGMENTS)),
+        segment_sense=_four(v, *(f"{c}.gain" for c in segments)),
+        segment_offset=_four(v, *(f"{c}.offset" for c in segments)),
         segment_drift=_four(v, *(f"segment_drift_{k}" for k in range(4))),
         segment_scale_drift=d["segment_scale_drift"],
         encoder_sign=d["encoder_sign"],
@@ -168,7 +180,8 @@ def _sensed(plant: PlantParams, v: Mapping[str, float], d: Mapping[str, float]) 
 
 def quantities(p: PlantParams, settings: Mapping[str, float]) -> dict[str, float]:
     """The true quantities, for the bias among the controller's parameters."""
-    return of.quantities(p, (settings["bias_i"], settings["bias_o"]))
+    most = settings.get("segment_max", ControlParams.segment_max)
+    return of.quantities(p, (settings["bias_i"], settings["bias_o"])) | liftoff.quantities(p, most)
 
 
 def make(p: PlantParams, seed: int, substeps: int) -> Plant:
@@ -177,7 +190,9 @@ def make(p: PlantParams, seed: int, substeps: int) -> Plant:
 
 
 def operator(rig: RigFile, plant: Plant, truth: Truth) -> SimulatedOperator:
-    """Who works on it."""
+    """Who works on it. What somebody has left hanging hangs on the hook from the start."""
+    if left := truth.defects["weight_left_kg"]:
+        plant.load(left, left * truth.plant.gravity, 0.0)
     return SimulatedOperator(plant, truth, rig.hook_seat.half_width or 0.0)
 
 
@@ -187,10 +202,12 @@ def copper_W(plant: Plant) -> float:
     return COIL_OHM * sum(i * i for i in currents[:10]) + SEGMENT_OHM * sum(i * i for i in currents[10:])
 
 
-def places(defects: Mapping[str, float], at: Mapping[str, int]) -> tuple[slice, list[int]]:
+def places(
+    defects: Mapping[str, float], at: Mapping[str, int], channels: tuple[str, ...] = CHANNELS
+) -> tuple[slice, list[int]]:
     """Which channels of the core are told, and where each goes among the signals, with planted wiring defects of the
     current telemetry."""
-    goes = {name: at[name] for name in CHANNELS}
+    goes = {name: at[name] for name in channels}
 
     def exchange(a: str, b: str) -> None:
         goes[a], goes[b] = goes[b], goes[a]
@@ -208,9 +225,11 @@ def places(defects: Mapping[str, float], at: Mapping[str, int]) -> tuple[slice, 
     return slice(None), list(goes.values())
 
 
-def spoil(values: Array, at: Mapping[str, int], defects: Mapping[str, float]) -> None:
-    """Put planted defects of sensors into telemetry (n, signals), and the angle within a turn."""
-    values[:, at["i_m1"]] *= defects["segment_sign_1"]
+def spoil(values: Array, at: Mapping[str, int], defects: Mapping[str, float], first: str = SEGMENTS[0]) -> None:
+    """Put planted defects of sensors into telemetry (n, signals), and the angle within a turn. `first`: one of the segments."""
+    if defects["contact_silent"]:
+        values[:, at["flags"]] = values[:, at["flags"]].astype(np.int64) & ~CONTACT
+    values[:, at[first]] *= defects["segment_sign_1"]
     if defects["stuck_current_yo_p"]:
         values[:, at["i_yo_p"]] = 4.0
     values[:, at["angle"]] = (values[:, at["angle"]] + math.pi) % (2 * math.pi) - math.pi
@@ -222,5 +241,5 @@ TSBS = Machine(
     integral_gains=frozenset(("ki_i", "ki_o", "ki_z", "ki_m")), turns=True,
     channels=CHANNELS, places=places, spoil=spoil,
     supply_V=148.0, windings={"temp_i": 0.0, "temp_o": 2.0, "temp_m": -3.0}, copper_W=copper_W,
-    operator=operator, daily=DAILY, traced=lambda _: TRACE, controls=Plant.settable,
+    operator=operator, daily=DAILY, traced=lambda _: TRACE, controls=Plant.settable, motions=MOTIONS,
 )  # fmt: skip

@@ -5,9 +5,8 @@
 #define GUARD 5.0 /* A s/rad, with which a run at the torque limit ends at its speed */
 
 /* Sharing of the segments. Static: T (6.9), the amplifiers cut what is too much, force with torque. Then T (6.19), force first,
- * what it leaves of segment_max for torque: lambda by T (6.24), or a half. Six phases: T (7.13) within (7.18), or the
- * amplitudes cut. */
-enum { STATIC, PRIORITY, HALF, SIX, SIX_CUT };
+ * what it leaves of segment_max for torque: lambda by T (6.24), or a half. Of six phases priority is T (7.13) within (7.18). */
+enum { STATIC, PRIORITY, HALF };
 
 static int limited(const tsbs_control *c) { return c->allocation == PRIORITY || c->allocation == HALF; }
 
@@ -17,18 +16,19 @@ static void tell(tsbs_law_state *l, double ix, double iy, double asked, double t
 }
 
 /* T (7.12): i_q1 = i_theta + i_y, i_q2 = i_theta - i_y, i_d1 = -i_x, i_d2 = i_x, segments 1, 2 and 3, 4 alike. Printed (7.13c,d)
- * have the signs of i_y exchanged, and (7.18) is no bound; see docs/explanation/errata.md. */
+ * have the signs of i_y exchanged, and (7.18) is no bound; see docs/explanation/errata.md. Static: the amplifiers cut q and d. */
 static void six(const tsbs_control *c, tsbs_law_state *l, double ix, double iy, double asked, tsbs_reference *out) {
     double most = c->segment_max, size = sqrt(ix * ix + iy * iy), turn = asked, bound = most;
-    if (c->allocation == SIX) {
-        if (size > most) ix *= most / size, iy *= most / size;
-        double room = most * most - ix * ix;
-        bound = room > iy * iy ? sqrt(room) - fabs(iy) : 0;
+    if (c->allocation == PRIORITY) {
+        if (size > most && c->literal_7_18 == 0) ix *= most / size, iy *= most / size;
+        double room = most * most - ix * ix, left = sqrt(room > 0 ? room : 0) - fabs(iy);
+        bound = left > 0 ? left : c->literal_7_18 != 0 ? -left : 0;
         turn = clip(asked, -bound, bound);
     }
-    double q[] = {turn + iy, turn - iy}, d[] = {-ix, ix};
+    double lifts = c->literal_7_13 != 0 ? -iy : iy, q[] = {turn + lifts, turn - lifts}, d[] = {-ix, ix};
     for (int k = 0; k < 2; k++) {
-        double amplitude = sqrt(q[k] * q[k] + d[k] * d[k]), part = amplitude > most ? most / amplitude : 1;
+        double amplitude = sqrt(q[k] * q[k] + d[k] * d[k]), part = 1;
+        if (c->allocation == PRIORITY && amplitude > most) part = most / amplitude * (1 - 1e-12); /* by a rounding error */
         out->segment[2 * k] = out->segment[2 * k + 1] = q[k] * part;
         out->across[2 * k] = out->across[2 * k + 1] = d[k] * part;
     }
@@ -37,7 +37,7 @@ static void six(const tsbs_control *c, tsbs_law_state *l, double ix, double iy, 
 
 void tsbs_allocate(const tsbs_control *c, tsbs_law_state *l, double ix, double iy, double asked, tsbs_reference *out) {
     double lambda = 0.5, most = c->segment_max, bound = most, turn = asked, *i = out->segment;
-    if (c->allocation >= SIX) {
+    if (c->phases == 6) {
         six(c, l, ix, iy, asked, out);
         return;
     }
@@ -115,17 +115,22 @@ static double torque(const tsbs_control *c, const tsbs_gains *g, tsbs_law_state 
     return released ? 0 : c->kp_theta * error + l->angle_integral + c->kd_theta * rate;
 }
 
+/* Axes turned by 45 degrees: x6 = (x + y)/sqrt 2, y6 = (-x + y)/sqrt 2, T (7.6) with the sign of (7.6b) put right; there
+ * alpha_n = sqrt 2 alpha_c and alpha_t = sqrt 2 alpha_d. Printed (7.14) has a minus in front of all three controllers. */
+static void own_frame(const tsbs_control *c, double *current, double *asked) {
+    double x = current[0] + current[1], y = current[1] - current[0], way = c->literal_7_14 != 0 ? -1 : 1;
+    current[0] = way * x / 2 * c->model_alpha_d / c->model_alpha_c;
+    current[1] = (c->literal_7_6b != 0 ? -way : way) * y / 2;
+    if (c->literal_7_14 == 1) *asked = -*asked; /* 2: those of the force alone */
+}
+
 void tsbs_rotate(const tsbs_control *c, const tsbs_gains *g, tsbs_law_state *l, const tsbs_reading *r, tsbs_reference *out) {
     double asked = torque(c, g, l, r), current[] = {0, 0};
     l->i_x = toward(l->i_x, c->i_x, c->i_ramp * TICK);
     l->i_y = toward(l->i_y, c->i_y, c->i_ramp * TICK);
     if (l->share == 0 && l->gamma != c->gamma) tsbs_balance(c, l);
     tsbs_carry(c, g->keep, l, r->position + 2, current);
-    if (c->allocation >= SIX) { /* axes turned by 45 degrees: x6 = (x + y)/sqrt 2, y6 = (-x + y)/sqrt 2; T (7.6), corrected */
-        double x = current[0] + current[1], y = current[1] - current[0];
-        current[0] = x / 2 * c->model_alpha_d / c->model_alpha_c; /* alpha_n = sqrt 2 alpha_c, alpha_t = sqrt 2 alpha_d */
-        current[1] = y / 2;
-    }
+    if (c->phases == 6) own_frame(c, current, &asked);
     tsbs_allocate(c, l, l->i_x + current[0], l->i_y + current[1], asked, out);
     if (l->share > 0) act(c, l, out);
     out->gamma = l->gamma;

@@ -59,6 +59,11 @@ class PlantParams:
     beta_2: float = 116.0
     beta_4: float = 0.0
     exchange_segments: float = 0.0
+    phases: float = 12.0
+    literal_7_6b: float = 0.0
+    literal_7_13: float = 0.0
+    literal_7_14: float = 0.0
+    literal_7_18: float = 0.0
     viscous: float = 0.081
     drag_share: float = 0.6
     coulomb: float = 0.05
@@ -165,6 +170,11 @@ class ControlParams:
     lag_compensation: float = 0.0
     segment_lag: float = 1.5e-4 + 1 / (2 * math.pi * 2000)
     pole_pairs: float = 8.0
+    phases: float = 12.0
+    literal_7_6b: float = 0.0
+    literal_7_13: float = 0.0
+    literal_7_14: float = 0.0
+    literal_7_18: float = 0.0
     lift_by: float = 0.0
     gamma_slew: float = 0.0
     torque_limit_run: float = 0.0

@@ -199,11 +199,11 @@ static void touchdown(const tsbs_params *p, const double *s, int b, wrench *w) {
 
 /* what acts of the four segments' currents in the stator's frame: X, Y and the means of segments 1, 3 and of 2, 4 */
 void tsbs_mix(const tsbs_params *p, const double *segment, double *mixed) {
-    int first = p->exchange_segments != 0;
-    const double *g = p->segment_gain;
+    int wrong = p->exchange_segments != 0, first = wrong && p->phases != 6, other = wrong && p->phases == 6 ? 2 : 0;
+    const double *g = p->segment_gain; /* of six phases two pairs can be exchanged, of twelve segments 1 and 2 */
     for (int k = 0; k < 8; k += 4) {
-        double s1 = segment[k + first] * g[0], s2 = segment[k + !first] * g[1];
-        double s3 = segment[k + 2] * g[2], s4 = segment[k + 3] * g[3];
+        double s1 = segment[k + first + other] * g[0], s2 = segment[k + !first + other] * g[1];
+        double s3 = segment[k + 2 - other] * g[2], s4 = segment[k + 3 - other] * g[3];
         mixed[k] = (s4 - s2) / 2;
         mixed[k + 1] = (s1 - s3) / 2;
         mixed[k + 2] = (s1 + s3) / 2;

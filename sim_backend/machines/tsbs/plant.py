@@ -24,6 +24,8 @@ TRACE: Final = (
     *("gamma", "demand_x", "demand_y", "torque_asked", "torque_given", "torque_bound", "lambda", "load_x", "load_y"),
 )
 """Of one tick: what is read, and what the law makes of it, which the amplifiers are told a tick later."""
+SHARED: Final = ("pole_pairs", "phases", "literal_7_6b", "literal_7_13", "literal_7_14", "literal_7_18")
+"""What the controller has of the machine's parameters."""
 _ffi, _lib = open_core(Path(__file__).with_name("tsbs.h"))
 
 
@@ -54,14 +56,14 @@ class Plant(CorePlant):
         state.substeps = substeps
         self._s: Any = state
         fill(self._p, vars(self.params))
-        fill(self._c, vars(control or ControlParams()) | {"pole_pairs": self.params.pole_pairs})
+        fill(self._c, vars(control or ControlParams()) | {name: getattr(self.params, name) for name in SHARED})
         _lib.tsbs_start(self._p, self._c, self._s, seed & (2**64 - 1))
 
     @property
-    def lifted(self) -> slice | None:
-        """Columns that a lift brings to rest, if not all radial ones. An end that the motor lifts may stay on its ring; the
-        shaft is then inclined, and of the inboard sensors, which are beside the bearing, only the horizontal one reads 0."""
-        return slice(0, 1) if self._c.lift_by else None
+    def lift_timeout_s(self) -> float:
+        """How much longer than its own time a lift may take, s. An end that the motor lifts may have to wait on its ring until
+        its field has been turned so far that it can."""
+        return 60.0 if self._c.lift_by else 5.0
 
     @property
     def speed(self) -> float:

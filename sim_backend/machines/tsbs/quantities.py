@@ -63,9 +63,6 @@ def motor_quantities(p: PlantParams, bias_A: tuple[float, ...]) -> dict[str, flo
     stiffness = p.alpha_x * (p.z_motor - p.z_sensor[0]) / span  # referred to the outboard sensors, T below (6.8)
     d, c = p.alpha_d - p.alpha_2, p.alpha_c + p.alpha_3
 
-    def drag(*bias: float) -> float:
-        return p.viscous * (1 - p.drag_share + p.drag_share * sum(b**2 for b in bias) / len(bias) / 9)
-
     return {
         "alpha_d": direct * vertical,
         "alpha_dx": direct * (g[1] + g[3]) / 2,
@@ -76,11 +73,16 @@ def motor_quantities(p: PlantParams, bias_A: tuple[float, ...]) -> dict[str, flo
         "gamma_0": p.gamma_zero,
         "gamma_0t": p.gamma_zero,
         "alpha_tau": (p.alpha_tau + p.beta_4) * sum(g) / 4,
-        "B": drag(*bias_A),
-        "B_high": drag(HIGH_BIAS_A),
+        "B": drag_of(p, *bias_A),
+        "B_high": drag_of(p, HIGH_BIAS_A),
         "T_c": p.coulomb,
         "J_z": p.polar_inertia,
     }
+
+
+def drag_of(p: PlantParams, *bias_A: float) -> float:
+    """Viscous drag, N m s/rad, at the biases of the radial AMBs; 0 is one that is idle."""
+    return p.viscous * (1 - p.drag_share + p.drag_share * sum(b**2 for b in bias_A) / len(bias_A) / 9)
 
 
 def own_weight(p: PlantParams, angles: Array) -> Array:

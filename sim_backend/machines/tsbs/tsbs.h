@@ -16,6 +16,11 @@ typedef struct {
     /* motor: T (6.5) for any gamma, with the ripple, the side pull and the displacement terms of T (5.25) */
     double alpha_d, alpha_c, alpha_x, alpha_tau, motor_x, motor_y, gamma_zero, segment_gain[4], pole_pairs;
     double alpha_2, alpha_3, alpha_4, alpha_6, beta_2, beta_4, exchange_segments;
+    /* 12: each segment has an amplifier, which is told its amplitude; 6: segments 1, 2 and 3, 4 share one, which is told q and d
+     * (T chapter 7). Of the latter the four words of segment currents are q1, d1, q2, d2. */
+    double phases;
+    /* of the controller: 1 for an equation of T chapter 7 as it is printed, of (7.14) 2 for the force alone */
+    double literal_7_6b, literal_7_13, literal_7_14, literal_7_18;
     /* drag: drag_share of `viscous` (at 3 A) goes with the square of the AMBs' currents; brake: while no drive drives */
     double viscous, drag_share, coulomb, coulomb_speed, brake, detent, detent_phase;
     double lever_slip;
@@ -52,6 +57,8 @@ typedef struct {
     double lift_by, gamma_slew, torque_limit_run, circle_radius, circle_hz;
     /* 1: T (6.29) with gamma by (6.36), (6.37); what the controller knows of the motor, referred to the outboard sensors */
     double balance, gamma_max, kp_b, kd_b, observer_pole, model_alpha_d, model_alpha_c, model_stiffness, model_mass;
+    /* as the machine has them */
+    double phases, literal_7_6b, literal_7_13, literal_7_14, literal_7_18;
     /* the controller's own idea of the planes: plane = share * outboard reading + (1 - share) * inboard reading */
     double share_i, share_o;
 } tsbs_control;

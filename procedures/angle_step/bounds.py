@@ -1,0 +1,162 @@
+"""Currents at the controller's full rate during a step: whether torque stays within what force leaves, and segments within I_s.
+
+Of a motor whose segments carry vectors, q along the field and d across it, force asks i_x, i_y and T (7.18), put right, leaves
+
+    |i_theta| <= max(0, sqrt(I_s^2 - i_x^2) - |i_y|)
+
+after i_x, i_y have been scaled into the circle I_s. Means over a millisecond would not do: a bound that steps reads as an
+ampere of excess. The capture begins just before the reference is written and lasts as long as the currents swing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.errors import AnalysisError
+from bench.recording import Recording
+from bench.rigfile import RigFile
+from bench.uncertainty import Estimate, Influence
+from procedures.servomotor.conventions import Servomotor, conventions
+from procedures.servomotor.parameters import stated
+from procedures.shared.certificates import certified_sensors
+
+Array = npt.NDArray[np.float64]
+ASKED = ("across", "along", "torque")
+CAPTURED_S = 0.4
+ROUNDING_A = 10 * 2**-23  # of what the law tells, single precision
+
+
+@dataclass(frozen=True)
+class Swing:
+    """A captured step: `t` (n,) s, `asked` i_x, i_y, i_theta of the law, each (n,) A, `vectors` (k, 2, n) A: q and d of each
+    segment as their sensors read; `limit` I_s, A."""
+
+    t: Array
+    asked: Mapping[str, Array]
+    vectors: Array
+    limit: float
+
+    @property
+    def bound(self) -> Array:
+        """What (i_x, i_y) leave to the torque current, (n,) A."""
+        return bound(self.asked["across"], self.asked["along"], self.limit)
+
+    @property
+    def excess(self) -> float:
+        """Greatest torque current beyond its bound, A: 0 where it was reached, negative where it never was."""
+        return float((np.abs(self.asked["torque"]) - self.bound).max())
+
+
+def bound(i_x: Array, i_y: Array, limit: float) -> Array:
+    """T (7.18), put right: A."""
+    scale = np.minimum(1.0, limit / np.maximum(np.hypot(i_x, i_y), 1e-12))
+    x, y = i_x * scale, i_y * scale
+    out: Array = np.maximum(0.0, np.sqrt(np.maximum(0.0, limit**2 - x**2)) - np.abs(y))
+    return out
+
+
+def captured(rig: RigFile) -> tuple[str, ...]:
+    """What is captured of a step: nothing where currents are amplitudes, or what the law asks for is not recorded."""
+    machine = conventions(rig)
+    names = (*machine.segments, *(machine.asked[key] for key in ASKED if key in machine.asked))
+    whole = machine.components == 2 and all(key in machine.asked for key in ASKED)
+    known = () if rig.capture is None else tuple(rig.capture.channels)
+    return names if whole and set(names) <= set(known) else ()
+
+
+def read_swing(recording: Recording[Any], number: object) -> Swing | None:
+    """The capture of a move by its number; None where the rig records none.
+
+    Raises:
+        AnalysisError: it is missing.
+    """
+    names = captured(recording.rig)
+    if not names:
+        return None
+    found = recording.captures(number=number)
+    if not found:
+        raise AnalysisError(f"move {number}: found no capture (was the run stopped early?)")
+    machine, data = conventions(recording.rig), found[0].arrays(*names)
+    return Swing(
+        np.arange(len(data[names[0]])) / found[0].rate_hz,
+        {key: data[machine.asked[key]] for key in ASKED},
+        np.array([[data[c] for c in pair] for pair in machine.vectors]),
+        stated(recording.rig, "motor.segment_limit").default,
+    )
+
+
+@dataclass(frozen=True)
+class Largest:
+    """The greatest amplitude of one step, A; q and d (2,) A there, which segment's, and what noise may add to it, A."""
+
+    amplitude: float
+    vector: Array
+    segment: int
+    floor: float
+
+
+def largest(swing: Swing, offsets: Array, gains: Array, noise: float) -> Largest:
+    """By true currents: `offsets` (k, 2) A and `gains` (k, 2) of the sensors. Samples are taken as they are: the derivative of
+    an encoder's counts makes currents jump from tick to tick. The largest of n alike exceeds them by their `noise`, A, times
+    sqrt(2 ln n) at most."""
+    true = (swing.vectors - offsets[:, :, None]) / gains[:, :, None]
+    size = np.hypot(true[:, 0], true[:, 1])
+    segment, at = (int(k) for k in np.unravel_index(int(np.argmax(size)), size.shape))
+    near = int((size >= size.max() - 3 * noise).sum())
+    return Largest(float(size[segment, at]), true[segment, :, at], segment, noise * math.sqrt(2 * math.log(near)))
+
+
+def estimates(where: str, swings: Sequence[Swing], rig: RigFile, bounded: bool) -> dict[str, Estimate]:
+    """`amplitude`, A, and where the torque current is `bounded` `bound_excess`, A: means over the steps of a case."""
+    machine = conventions(rig)
+    sensors = certified_sensors(rig, {name: name for name in machine.segments})
+    gains, offsets = (np.array([[sensors[f"{key}_{c}"].value for c in pair] for pair in machine.vectors])
+                      for key in ("gain", "offset"))  # fmt: skip
+    found = [largest(s, offsets, gains, _noise(rig, machine, 1 / float(s.t[1]))) for s in swings]
+    floor = float(np.mean([f.floor for f in found]))
+    out = {"amplitude": _scattered(f"amplitude/{where}", [f.amplitude for f in found]) - floor / 2
+           + _within(f"noise/amplitude/{where}", "noise in the greatest amplitude", floor / 2)}  # fmt: skip
+    out["amplitude"] = out["amplitude"] + _sensed(found, machine, sensors)
+    if bounded:
+        rounding = _within(f"rounding/{where}", "rounding of what the law tells", ROUNDING_A)
+        out["bound_excess"] = Estimate.exact(float(np.mean([s.excess for s in swings])), "A") + rounding
+    return out
+
+
+def _sensed(found: Sequence[Largest], machine: Servomotor, sensors: Mapping[str, Estimate]) -> Estimate:
+    """Zero, with what gains and offsets of the sensors do: da = -(q (q dg_q + do_q) + d (d dg_d + do_d))/a."""
+    out = Estimate.exact(0.0, "A")
+    for k, pair in enumerate(machine.vectors):
+        for part, channel in enumerate(pair):
+            hit = [f for f in found if f.segment == k]
+            by_offset = sum(float(f.vector[part]) / f.amplitude for f in hit) / len(found)
+            by_gain = sum(float(f.vector[part]) ** 2 / f.amplitude for f in hit) / len(found)
+            gain, offset = sensors[f"gain_{channel}"], sensors[f"offset_{channel}"]
+            out = out - (gain - gain.value) * by_gain - (offset - offset.value) * by_offset
+    return Estimate(out.value, "A", out.sensitivities)
+
+
+def _noise(rig: RigFile, machine: Servomotor, rate_hz: float) -> float:
+    """Of one reading of a segment's current, A: the rig file has that of a sample of the telemetry, a mean of as many."""
+    period = rig.messages[rig.binding.telemetry[0]].period_s or 1 / rate_hz
+    stated = [rig.channels[c].noise or 0.0 for c in machine.segments]
+    return max(stated) * math.sqrt(max(period * rate_hz, 1.0))
+
+
+def _scattered(identity: str, values: Sequence[float]) -> Estimate:
+    u = float(np.std(values, ddof=1)) / math.sqrt(len(values))
+    influence = Influence(id=f"scatter/{identity}", name="scatter of the repeats", u=u, unit="A", kind="A",
+                          distribution="normal", dof=float(len(values) - 1), source=f"{len(values)} steps")  # fmt: skip
+    return Estimate.of(float(np.mean(values)), influence)
+
+
+def _within(identity: str, name: str, half: float) -> Estimate:
+    """Zero, within a half width."""
+    influence = Influence(id=identity, name=name, u=half / math.sqrt(3), unit="A", kind="B", distribution="rectangular")
+    return Estimate.of(0.0, influence)

@@ -1,0 +1,158 @@
+"""From the recorded windows of a run at the torque limit to numbers, one window each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.errors import AnalysisError
+from bench.recording import Captured, Recording, Step
+from bench.rigfile.roles import ANGLE, SPEED, STATUS
+from procedures.maximum_speed import fit
+from procedures.maximum_speed.fit import Turning
+from procedures.maximum_speed.plan import HALF, OP, Plan
+from procedures.servomotor.conventions import Servomotor, conventions
+
+Array = npt.NDArray[np.float64]
+RUN = "run"
+GUARDED, UNSTEADY, NOT_CARRIED, SET_POINT = "guarded", "unsteady", "not-carried", "set-point"
+SHARED = "sharing"  # event: the segments are shared another way from now on
+"""Events: the rotor reached the speed that guards the run; its speed did not become steady; no set point makes the motor carry
+what was asked for; where it holds its end."""
+DEMANDS, GIVEN, BOUND, SHARE = ("demand_x", "demand_y"), "torque_given", "torque_bound", "lambda"
+ACROSS = ("i_d1", "i_d2", "i_d3", "i_d4")
+"""What a capture of the controller calls what its law asks for, gives and allows, and the segments' currents across the
+field."""
+AT_BOUND_A = 1e-3  # of the bound, and what is given is all there is
+
+
+def coils(machine: Servomotor) -> tuple[str, ...]:
+    """The radial AMBs' currents."""
+    return machine.coils_of("xi", "yi", "xo", "yo")
+
+
+def channels(machine: Servomotor) -> tuple[str, ...]:
+    """What is read of a window."""
+    return (ANGLE, SPEED, STATUS, *machine.segments, *coils(machine))
+
+
+def captured(machine: Servomotor) -> tuple[str, ...]:
+    """What is captured in it."""
+    return (*DEMANDS, GIVEN, BOUND, SHARE, *machine.segments, *ACROSS)
+
+
+@dataclass(frozen=True)
+class Told:
+    """A window's capture, means over it: `sizes` of i_x, i_y (2,) A; the `bound` and `share` that follow from them at every
+    instant, and the share that the other sharing would make; what the law told of bound, share and torque current; `at_bound`,
+    in which share of the samples it gave all; segments `along` and `across` the field (4,) A; the largest amplitude of a
+    segment A."""
+
+    sizes: Array
+    bound: float
+    share: float
+    other_share: float
+    told_bound: float
+    told_share: float
+    given: float
+    at_bound: float
+    along: Array
+    across: Array
+    largest: float
+
+
+@dataclass(frozen=True)
+class Window:
+    """One window: what was asked, how it turned, mean currents of segments (4,) and coils, flags, its capture."""
+
+    sharing: str
+    direction: int
+    repeat: int
+    turning: Turning
+    segments: Array
+    coils: Mapping[str, float]
+    flags: int
+    told: Told
+    lost: int
+    expected: int
+
+    @property
+    def speed(self) -> float:
+        """In the direction that was asked for, rad/s."""
+        return self.direction * self.turning.speed
+
+    @property
+    def where(self) -> str:
+        """How it is named to the reader."""
+        way = "forward" if self.direction > 0 else "backward"
+        return f"{self.sharing}, {way}, run {self.repeat + 1}"
+
+
+def read_windows(recording: Recording[Plan], limit_A: float) -> list[Window]:
+    """Every window, in time order.
+
+    Raises:
+        AnalysisError: there are none, one has no capture, or the rotor hardly turns in it.
+    """
+    machine = conventions(recording.rig)
+    found = [_read(recording, step, machine, limit_A) for step in recording.steps(RUN)]
+    if not found:
+        raise AnalysisError(
+            "found no runs at the torque limit; expected those of the plan (was the run stopped early?)"
+        )
+    return found
+
+
+def _read(recording: Recording[Plan], step: Step, machine: Servomotor, limit_A: float) -> Window:
+    labels = step.labels
+    data = step.read(*channels(machine))
+    if len(data["t_ns"]) < 50:
+        raise AnalysisError(f"run {dict(labels)}: found {len(data['t_ns'])} samples; expected 50 or more")
+    captures = recording.captures(number=labels["number"])
+    if not captures:
+        raise AnalysisError(f"run {dict(labels)}: found no capture")
+    t = (data["t_ns"] - data["t_ns"][0]).astype(np.float64) * 1e-9
+    flags: npt.NDArray[Any] = data[STATUS].astype(np.int64)
+    turning = fit.turning(t, data[ANGLE])
+    whole = slice(turning.samples)
+    return Window(
+        sharing=str(labels["sharing"]), direction=int(labels["direction"]), repeat=int(labels["repeat"]),
+        turning=turning,
+        segments=np.array([float(data[c][whole].mean()) for c in machine.segments]),
+        coils={c: float(data[c].mean()) for c in coils(machine)},
+        flags=int(np.bitwise_or.reduce(flags)),
+        told=_told(captures[0], machine, str(labels["sharing"]), limit_A, turning.speed),
+        lost=step.lost(), expected=step.expected(),
+    )  # fmt: skip
+
+
+def _told(capture: Captured, machine: Servomotor, sharing: str, limit_A: float, speed: float) -> Told:
+    whole = fit.whole_turns(capture.samples, capture.rate_hz, speed)
+    if not whole:
+        raise AnalysisError(f"capture of a run at {speed:.1f} rad/s: found less than a turn; expected one at least")
+    data = {name: x[:whole] for name, x in capture.arrays(*captured(machine)).items()}
+    i_x, i_y = (data[name] for name in DEMANDS)
+    along, across = (np.array([data[c] for c in names]) for names in (machine.segments, ACROSS))
+    return Told(
+        sizes=np.array([np.abs(i_x).mean(), np.abs(i_y).mean()]),
+        bound=float(fit.bound(limit_A, i_x, i_y, sharing).mean()),
+        share=float(fit.share(limit_A, i_x, i_y, sharing).mean()),
+        other_share=float(fit.share(limit_A, i_x, i_y, OP if sharing == HALF else HALF).mean()),
+        told_bound=float(data[BOUND].mean()),
+        told_share=float(data[SHARE].mean()),
+        given=float(data[GIVEN].mean()),
+        at_bound=float((np.abs(data[GIVEN]) >= data[BOUND] - AT_BOUND_A).mean()),
+        along=along.mean(axis=1),
+        across=across.mean(axis=1),
+        largest=float(np.hypot(along, across).max()),
+    )
+
+
+def by_sharing(windows: list[Window], sharing: str, direction: int) -> list[Window]:
+    """Those of one sharing in one direction, by repeat."""
+    found = [w for w in windows if (w.sharing, w.direction) == (sharing, direction)]
+    return sorted(found, key=lambda w: w.repeat)

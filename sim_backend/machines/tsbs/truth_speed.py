@@ -1,0 +1,76 @@
+"""How fast the servomotor truly turns at its torque limit: the same machine under the same settings for a long time, with other
+noise. The noise is part of it: what the law makes of it takes torque, so that a machine without it is another."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.rigfile import RigFile
+from sim_backend import core
+from sim_backend.controller.parameters import Parameters
+from sim_backend.core.plant import TICK_S
+from sim_backend.machine import Truth
+from sim_backend.machines.tsbs.plant import TRACE, Plant
+from sim_backend.motion import Numbers, SpeedsAsked
+
+Array = npt.NDArray[np.float64]
+OTHER_NOISE = 0x5EED
+SETTLE_S, CHUNK_S, RIPPLE_S = 6.0, 2.0, 4.0
+AT = {name: k for k, name in enumerate(TRACE)}
+
+
+def _ticks(seconds: float) -> int:
+    return round(seconds / TICK_S)
+
+
+def speeds(rig: RigFile, drawn: Truth, asked: SpeedsAsked) -> Mapping[str, Mapping[str, float]]:
+    """By sharing: `speed` rad/s, mean of both directions, `bound` A of the torque current, and `ripple` rad/s, the rms of the
+    speed's orders 1 to 4."""
+    plant = Plant(drawn.plant, drawn.noise ^ OTHER_NOISE)
+    parameters = Parameters(rig, drawn, plant)
+
+    def write(values: Numbers) -> None:
+        for name, value in values.items():
+            parameters.set(name, value, True, True)
+
+    write(asked.settings)
+    for mode, seconds in ((core.READY, 0.5), (core.LIFT, parameters.own["lift_time_s"]), (core.LEVITATE, 2.0)):
+        plant.mode = mode
+        plant.run(_ticks(seconds))
+    for values in asked.before:
+        write(values)
+        plant.run(_ticks(SETTLE_S / 2))
+    found: dict[str, list[tuple[float, float, float]]] = {name: [] for name in asked.sharings}
+    for way in (1, -1):
+        plant.set("speed_ref", way * asked.guard)
+        for name, values in asked.sharings.items():
+            write(values)
+            plant.run(_ticks(SETTLE_S))
+            found[name].append(_watched(plant, asked.seconds, way))
+    return {
+        name: dict(zip(("speed", "bound", "ripple"), np.mean(both, axis=0).tolist(), strict=True))
+        for name, both in found.items()
+    }
+
+
+def _watched(plant: Plant, seconds: float, way: int) -> tuple[float, float, float]:
+    began, chunks = float(plant.state()["s"][5]), max(1, round(seconds / CHUNK_S))
+    bounds = [plant.run(_ticks(CHUNK_S), 1)[1][:, AT["torque_bound"]].mean() for _ in range(chunks)]
+    speed = way * (float(plant.state()["s"][5]) - began) / (chunks * CHUNK_S)
+    return speed, float(np.mean(bounds)), _ripple(plant)
+
+
+def _ripple(plant: Plant) -> float:
+    rows = []
+    for _ in range(round(RIPPLE_S / 1e-3)):
+        plant.run(_ticks(1e-3))
+        s = plant.state()["s"]
+        rows.append((s[5], s[11]))
+    angle, speed = np.array(rows).T
+    orders = [w(n * angle) for n in range(1, 5) for w in (np.cos, np.sin)]
+    terms: Array = np.linalg.lstsq(np.column_stack([np.ones_like(angle), *orders]), speed, rcond=None)[0][1:]
+    return math.sqrt(float((terms**2).sum()) / 2)

@@ -1,0 +1,203 @@
+"""Maximum speed through the whole path: it recovers the truth, refuses what would trip, and names what is wrong."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from bench.calibration import Calibration
+from bench.cli.campaign.facts import simulated_step
+from bench.cli.campaign.tasks import RigTask, StepTask
+from bench.cli.compose import Request, prepare
+from bench.cli.motion_truth import truth_of_motion
+from bench.cli.virtual import Simulated, simulated_run
+from bench.errors import ConfigError
+from bench.findings import Effect, Finding
+from bench.procedure import Measured
+from bench.rigfile import load_rig
+from bench.uncertainty import Estimate, interval
+from bench.units import RPM
+from procedures.maximum_speed.plan import Plan
+from procedures.maximum_speed.procedure import check, foresees
+from sim_backend.truth import nominal
+
+SHORT: dict[str, Any] = {"repeats": 3, "average_s": 1.0, "dwell_s": 1.2}
+RAISED: dict[str, Any] = {**SHORT, "limit_A": 2.75, "carried_A": 2.0, "bias_A": 4.0, "dwell_s": 4.0}
+BEFORE: Mapping[str, dict[str, Any]] = {
+    "torque-constant": {"masses": ("M2", "M3"), "wiring_A": 0.5, "settle_s": 0.5, "average_s": 0.2},
+    "spindown": {"repeats": 2, "motor_carries": True},
+}
+
+
+def facts_of(rig: str, seed: int, folder: Path, truth: Mapping[str, float] | None = None) -> dict[str, Calibration]:
+    """What the run rests on, of the sound machine."""
+    return {
+        name: simulated_run(name, rig, seed, plan, folder / f"{name}.mcap", truth).calibration()
+        for name, plan in BEFORE.items()
+    }
+
+
+def run(
+    folder: Path, rig: str, seed: int, facts: Mapping[str, Calibration], truth: Mapping[str, float] | None = None,
+    **plan: Any,
+) -> Simulated:  # fmt: skip
+    return simulated_run("maximum-speed", rig, seed, {**SHORT, **plan}, folder / "recording.mcap", truth, facts)
+
+
+def results(done: Simulated) -> dict[str, Estimate]:
+    return {m.quantity.name + (f"@{m.where}" if m.where else ""): m.estimate
+            for m in done.results if isinstance(m, Measured)}  # fmt: skip
+
+
+def serious(done: Simulated) -> dict[str, Finding]:
+    return {f.code: f for f in done.results if isinstance(f, Finding) and f.effect is not Effect.NOTE}
+
+
+@pytest.fixture(scope="module")
+def known(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Calibration]:
+    """Of the rig with the drag of T Fig. 6.8; seed fixed before any tuning."""
+    return facts_of("tsbs12-drag", 2026, tmp_path_factory.mktemp("facts"))
+
+
+def test_a_sound_rig_is_recovered_within_its_intervals(tmp_path: Path, known: dict[str, Calibration]) -> None:
+    done = run(tmp_path, "tsbs12-drag", 2026, known)
+    found, true = results(done), truth_of_motion(done)
+    assert serious(done) == {}
+    assert set(found) == set(true)
+    for name, e in found.items():
+        assert abs(e.value - true[name]) < 1.6 * interval(e).U, name
+    assert abs(found["ratio"].value / found["ratio_predicted"].value - 1) < 0.01  # of the formula
+    assert found["predicted_op"].contributions["machine/polar_inertia"] ** 2 > 0.7 * found["predicted_op"].u ** 2
+    assert found["ratio"].u < 1e-3  # which knows no inertia
+    assert len(done.recording.all_steps()) == done.procedure.step_count(done.recording.plan)
+
+
+def test_the_nominal_rig_shows_what_the_thesis_prints(tmp_path: Path) -> None:
+    """T Fig. 6.8: 403 and 601 r/min, 49 % apart. By hand at I_s 7.8 A with i_y 4.02 and |i_x| 0.23 A: 3.78 and 5.68 A, times
+    2.87 N m/A less 0.055 N m over 0.257 N m s/rad are 42.0 and 63.2 rad/s."""
+    centre = nominal(load_rig("tsbs12-drag"))
+    done = run(tmp_path, "tsbs12-drag", 0, facts_of("tsbs12-drag", 0, tmp_path, centre), centre)
+    found = results(done)
+    assert found["ratio"].value == pytest.approx(1.50, abs=0.03)
+    assert found["speed_half"].value * RPM == pytest.approx(402, rel=0.01)
+    assert found["speed_op"].value * RPM == pytest.approx(603, rel=0.01)
+    by_hand = {"half": (3.78 * 2.87 - 0.055) / 0.257, "op": (5.68 * 2.87 - 0.055) / 0.257}
+    for name, value in by_hand.items():
+        assert found[f"speed_{name}"].value == pytest.approx(value, rel=5e-3)
+        assert (
+            abs(found[f"predicted_{name}"].value - found[f"speed_{name}"].value)
+            < interval(found[f"predicted_{name}"]).U
+        )
+    assert found["torque_slope"].value == pytest.approx(0.257, rel=0.015)
+    assert serious(done) == {}
+
+
+def test_a_plan_that_would_trip_is_refused_by_the_facts(tmp_path: Path) -> None:
+    """10 A beside i_y 4.01 A and some 0.2 A of i_x leave 7.89 A: times 2.8 N m/A over 0.059 N m s/rad are 378 rad/s, where
+    the machine trips at 80."""
+    facts = facts_of("tsbs12", 1, tmp_path)
+    b, torque = facts["spindown"].values["B"].value, facts["torque-constant"].values
+    with pytest.raises(ConfigError, match="nothing was started") as refused:
+        run(tmp_path, "tsbs12", 1, facts)
+    said = re.search(r"turn the rotor at (\d+) rad/s \(\d+ r/min\); the guard is 70 rad/s", str(refused.value))
+    assert said is not None
+    speed = (10 - (48.55 / 12.1 + 0.2) / 2) * torque["alpha_tau"].value * math.cos(8 * torque["gamma_0t"].value) / b
+    assert float(said.group(1)) == pytest.approx(speed, rel=5e-3)  # T_c takes 0.2 %
+    assert not (tmp_path / "recording.mcap").exists()
+    rig = load_rig("tsbs12")
+    assert list(foresees(rig, Plan(**RAISED), facts)) == []
+    (slow,) = foresees(rig, Plan(**{**RAISED, "carried_A": 2.7}), facts)
+    assert "lambda 1/2" in slow
+
+
+def test_a_drawn_machine_that_the_plan_is_none_for_is_counted_apart(tmp_path: Path) -> None:
+    """Its own facts say so: no value is missing, and the rig stands among those that cannot do the run."""
+    task = RigTask("tsbs12", load_rig("tsbs12").digest, (), {}, "none", str(tmp_path))
+    step = StepTask("maximum-speed", {"limit_A": 5.0}, (), False)
+    done = simulated_step(task, step, 1, tmp_path / "recording.mcap", facts_of("tsbs12", 1, tmp_path))
+    assert "turn the rotor at" in done.cannot
+    assert list(done.results) == []
+
+
+def test_a_commutation_that_is_meant_to_be_late_is_sound(tmp_path: Path, known: dict[str, Calibration]) -> None:
+    """T's own, by the prototype 584 in place of 603 r/min: i_x takes part of what the field is turned by. A lag and the
+    encoder's zero drive the rotor one way together, 0.1 N m and more, which drops out of the mean over both directions."""
+    done = run(tmp_path, "tsbs12-drag", 2026, known, commutation="late")
+    found, true = results(done), truth_of_motion(done)
+    assert serious(done) == {}
+    assert found["ratio"].value / found["ratio_predicted"].value == pytest.approx(1, abs=0.01)
+    for name in ("speed_op", "predicted_op", "ratio"):
+        assert abs(found[name].value - true[name]) < 1.6 * interval(found[name]).U, name
+
+
+def test_what_is_missing_is_said_with_the_commands_that_make_it(tmp_path: Path) -> None:
+    request = Request("maximum-speed", "tsbs12-drag", seed=3, out=tmp_path, calibrations=tmp_path)
+    with pytest.raises(ConfigError) as refused:
+        prepare(request)
+    said = str(refused.value)
+    assert "bench run spindown --rig tsbs12-drag --seed 3 --plan motor_carries=true" in said
+    assert "bench run torque-constant --rig tsbs12-drag --seed 3" in said
+
+
+def test_the_drag_of_another_state_is_refused(tmp_path: Path, known: dict[str, Calibration]) -> None:
+    """With both AMBs on, tsbs12 has 0.081, not 0.057 N m s/rad."""
+    other = simulated_run("spindown", "tsbs12-drag", 2026, {"repeats": 2}, tmp_path / "both.mcap").calibration()
+    with pytest.raises(ConfigError, match="motor_carries = 0"):
+        run(tmp_path, "tsbs12-drag", 2026, {**known, "spindown": other})
+
+
+def test_a_raised_rotor_runs_on_the_machine_of_the_thesis(tmp_path: Path) -> None:
+    """i_y 2 A, 2.75 A of limit, 4 A of bias inboard: B is 0.076, taken from the line through both biases of the spindown."""
+    done = run(tmp_path, "tsbs12", 3, facts_of("tsbs12", 3, tmp_path), **RAISED)
+    found, true = results(done), truth_of_motion(done)
+    assert serious(done) == {}
+    assert found["speed_op"].value < 64
+    for name, e in found.items():
+        assert abs(e.value - true[name]) < 1.6 * interval(e).U, name
+
+
+@pytest.mark.parametrize(
+    ("defect", "code", "says"),
+    [
+        ({"kept_allocation": 2.0}, "sharing-not-switched", "lambda is 0.500"),
+        ({"factor_segment_max": 1.03}, "bound-differs", "another limit"),
+        ({"factor_lag_compensation": 0.0}, "commutation-late", "behind the field"),
+        ({"exchange_segments": 1.0}, "segments-exchanged", "exchanged"),
+        ({"viscous": 1.06 * 0.2813}, "speed-contradicts", "B, T_c or alpha_tau"),
+        ({"segment_gain_0": 1.1, "segment_gain_2": 1.1}, "ratio-contradicts", "pairs of segments"),
+    ],
+)
+def test_a_defect_is_named_and_does_not_pass(
+    tmp_path: Path, known: dict[str, Calibration], defect: dict[str, float], code: str, says: str
+) -> None:
+    """The facts are those of the sound machine: what changed since is what is planted."""
+    found = serious(run(tmp_path, "tsbs12-drag", 2026, known, defect))
+    assert code in found, found
+    assert says in found[code].text
+
+
+def test_a_run_that_ends_at_its_guard_is_no_maximum_speed(tmp_path: Path, known: dict[str, Calibration]) -> None:
+    """The drag is half of what was adopted: the rotor reaches the speed reference, and the run ends there."""
+    found = serious(run(tmp_path, "tsbs12-drag", 2026, known, {"viscous": 0.12}))
+    assert set(found) == {"guarded"}
+
+
+@pytest.mark.parametrize(
+    ("plan", "said"),
+    [
+        ({"limit_A": 4.2}, "A of reserve"),
+        ({"limit_A": 11.0}, "1 to 10 A"),
+        ({"guard_rad_s": 75.0}, "takes -70 to 70"),
+        ({"capture_s": 3.0}, "at most average_s"),
+        ({"set_point_m": 2e-4}, "-100 to 100"),
+    ],
+)
+def test_what_cannot_work_is_refused_by_the_rig_alone(plan: dict[str, float], said: str) -> None:
+    assert any(said in text for text in check(load_rig("tsbs12-drag"), Plan(**plan))), list(
+        check(load_rig("tsbs12-drag"), Plan(**plan))
+    )
