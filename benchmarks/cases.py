@@ -20,7 +20,7 @@ RIGS = {
     "tsbs12": ("amb-calibration", "force-constant", "negative-stiffness", "force-coupling", "torque-constant", "spindown",
                "angle-step", "lift-off", "slew", "force-map", "load-balancing"),
     "tsbs12-offset": ("load-balancing",),
-    "tsbs12-drag": ("spindown", "maximum-speed"),
+    "tsbs12-drag": ("maximum-speed",),
     "amb5dof": ("bearing-model", "step", "tracking", "unbalance", "compensation", "balance", "run-up", "coast-down",
                 "sensitivity"),
     "amb1dof": ("derivative", "estimator-compare"),

@@ -74,10 +74,6 @@ def test_the_chain_has_what_identifies_the_machine() -> None:
         "force-coupling",
         "torque-constant",
         "spindown",
-        "spindown",
-        "maximum-speed",
-        "lift-off",
-        "load-balancing",
     ]
     assert set(steps) <= {entry.name for entry in catalogue.PROCEDURES}
 
