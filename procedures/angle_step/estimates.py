@@ -5,16 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
 from procedures.angle_step import bounds, steps
+from procedures.angle_step.fine import BETWEEN, Fine, fine
 from procedures.angle_step.response import Response, response
 from procedures.angle_step.steps import Case, Done
 from procedures.servomotor.conventions import conventions
 from procedures.shared.certificates import certified_gain
+
+Moved = TypeVar("Moved", Response, Fine)
 
 
 @dataclass(frozen=True)
@@ -44,6 +48,10 @@ def by_case(moves: list[Done], rig: RigFile, band: float, count_rad: float) -> d
         found = _estimates(case, responses, gains, share, count_rad, period)
         if swings := [d.swing for d in done if d.swing is not None]:
             found |= bounds.estimates(case.where, swings, rig, case.allocation == "priority")
+            noise = bounds.noise_of(rig, tuple(machine.positions.values()), 1 / float(swings[0].t[1]))
+            shown = [fine(d, d.swing, within, count_rad, noise) for d in done if d.swing is not None]
+            if len(whole := [f for f in shown if f is not None]) == len(done):
+                found |= _finer(case, whole, responses, gains, share, count_rad, float(swings[0].t[1]))
         out[case] = Result(case, responses, found)
     return out
 
@@ -83,6 +91,43 @@ def _estimates(
     return out
 
 
+def _finer(
+    case: Case,
+    r: Sequence[Fine],
+    still: Sequence[Response],
+    gains: Mapping[str, Estimate],
+    share: float,
+    count: float,
+    tick: float,
+) -> dict[str, Estimate]:
+    """What captures say better, with the influences that they have."""
+    where = case.where
+
+    def mean(name: str, unit: str, of: Callable[[Fine], float]) -> Estimate:
+        return _repeated(f"{name}/{where}", unit, [of(x) for x in r])
+
+    slope = 1 / math.sqrt(np.mean([1 / x.slopes[0] ** 2 + 1 / x.slopes[1] ** 2 for x in r]))
+    between = _bound(f"encoder/{where}", "encoder between its counts", BETWEEN * count, "rad")
+    sampling = _bound(f"sampling/{where}", "sampling", tick / 2, "s")
+    band = _bound(f"encoder/settling/{where}", "encoder between its counts", max(x.settling_off for x in r), "s")
+    noise, motor_noise = (
+        _bound(f"noise/{where}", "noise in a peak", raised / 2, "m") - raised
+        for raised in (float(np.mean([x.floor for x in r])), float(np.mean([x.motor_floor for x in r])))
+    )
+    outboard = _gained(r, lambda x: x.towards, lambda x: x.peak, {"xo": 1.0, "yo": 1.0}, gains)
+    rest = _repeated(f"standstill/{where}", "m", [x.rest_peak for x in still])
+    planes = {"xo": share, "yo": share, "xi": 1 - share, "yi": 1 - share}
+    motor = _gained(r, lambda x: x.towards_motor, lambda x: x.peak_motor, planes, gains)
+    return {
+        "rise_time": mean("rise_time", "s", lambda x: x.rise) + sampling + between * (1 / slope),
+        "overshoot": mean("overshoot", "1", lambda x: x.overshoot) + between * (1 / case.size),
+        "settling_time": mean("settling_time", "s", lambda x: x.settling) + sampling + band,
+        "peak_outboard": mean("peak_outboard", "m", lambda x: x.peak) + outboard + noise,
+        "peak_motor": mean("peak_motor", "m", lambda x: x.peak_motor) + motor + motor_noise,
+        "excess": mean("excess", "m", lambda x: x.peak) + outboard - rest + noise,
+    }
+
+
 def _repeated(identity: str, unit: str, values: Sequence[float]) -> Estimate:
     """Mean of repeats with its Type A uncertainty."""
     u = float(np.std(values, ddof=1)) / math.sqrt(len(values))
@@ -100,7 +145,7 @@ def _bound(identity: str, name: str, half: float, unit: str) -> Estimate:
 
 
 def _gained(
-    r: Sequence[Response], towards: Callable[[Response], np.ndarray], peak: Callable[[Response], float],
+    r: Sequence[Moved], towards: Callable[[Moved], np.ndarray], peak: Callable[[Moved], float],
     share: Mapping[str, float], gains: Mapping[str, Estimate],
 ) -> Estimate:  # fmt: skip
     """Zero, with what the gains of the position sensors do to a peak: dr = -(x^2 dg_x + y^2 dg_y) / r for one plane.
