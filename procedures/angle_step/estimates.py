@@ -46,14 +46,23 @@ def by_case(moves: list[Done], rig: RigFile, band: float, count_rad: float) -> d
         within = max(band * case.size, 2 * count_rad)
         responses = tuple(response(d.move, within) for d in done)
         found = _estimates(case, responses, gains, share, count_rad, period)
-        if swings := [d.swing for d in done if d.swing is not None]:
-            found |= bounds.estimates(case.where, swings, rig, case.allocation == "priority")
-            noise = bounds.noise_of(rig, tuple(machine.positions.values()), 1 / float(swings[0].t[1]))
-            shown = [fine(d, d.swing, within, count_rad, noise) for d in done if d.swing is not None]
-            if len(whole := [f for f in shown if f is not None]) == len(done):
-                found |= _finer(case, whole, responses, gains, share, count_rad, float(swings[0].t[1]))
+        if all(d.swing is not None for d in done):
+            found |= _captured(case, done, responses, rig, within, count_rad)
         out[case] = Result(case, responses, found)
     return out
+
+
+def _captured(
+    case: Case, done: Sequence[Done], responses: Sequence[Response], rig: RigFile, band_rad: float, count: float
+) -> dict[str, Estimate]:
+    """What captures add, and what they say better where each step is over within its own."""
+    machine, swings = conventions(rig), [d.swing for d in done if d.swing is not None]
+    tick = float(swings[0].t[1])
+    out = bounds.estimates(case.where, swings, rig, case.allocation == "priority")
+    noise = bounds.noise_of(rig, tuple(machine.positions.values()), 1 / tick)
+    shown = [fine(d, s, band_rad, count, noise) for d, s in zip(done, swings, strict=True)]
+    whole = [f for f in shown if f is not None]
+    return out | (_finer(case, whole, responses, rig, count, tick) if len(whole) == len(done) else {})
 
 
 def _period(moves: list[Done]) -> float:
@@ -92,19 +101,15 @@ def _estimates(
 
 
 def _finer(
-    case: Case,
-    r: Sequence[Fine],
-    still: Sequence[Response],
-    gains: Mapping[str, Estimate],
-    share: float,
-    count: float,
-    tick: float,
+    case: Case, r: Sequence[Fine], still: Sequence[Response], rig: RigFile, count: float, tick: float
 ) -> dict[str, Estimate]:
-    """What captures say better, with the influences that they have."""
-    where = case.where
+    """With the influences that captures have."""
+    where, machine, ways = case.where, conventions(rig), [x.forward for x in r]
+    share = machine.sensor_share(rig.geometry["com_to_motor"].value, rig)
+    gains = {axis: certified_gain(rig, channel) for axis, channel in machine.positions.items()}
 
     def mean(name: str, unit: str, of: Callable[[Fine], float]) -> Estimate:
-        return _repeated(f"{name}/{where}", unit, [of(x) for x in r])
+        return _each_way(f"{name}/{where}", unit, [of(x) for x in r], ways)
 
     slope = 1 / math.sqrt(np.mean([1 / x.slopes[0] ** 2 + 1 / x.slopes[1] ** 2 for x in r]))
     between = _bound(f"encoder/{where}", "encoder between its counts", BETWEEN * count, "rad")
@@ -115,7 +120,7 @@ def _finer(
         for raised in (float(np.mean([x.floor for x in r])), float(np.mean([x.motor_floor for x in r])))
     )
     outboard = _gained(r, lambda x: x.towards, lambda x: x.peak, {"xo": 1.0, "yo": 1.0}, gains)
-    rest = _repeated(f"standstill/{where}", "m", [x.rest_peak for x in still])
+    rest = _each_way(f"standstill/{where}", "m", [x.rest_peak for x in still], ways)
     planes = {"xo": share, "yo": share, "xi": 1 - share, "yi": 1 - share}
     motor = _gained(r, lambda x: x.towards_motor, lambda x: x.peak_motor, planes, gains)
     return {
@@ -134,6 +139,18 @@ def _repeated(identity: str, unit: str, values: Sequence[float]) -> Estimate:
     influence = Influence(id=f"scatter/{identity}", name="scatter of the repeats", u=u, unit=unit, kind="A",
                           distribution="normal", dof=float(len(values) - 1), source=f"{len(values)} steps")  # fmt: skip
     return Estimate.of(float(np.mean(values)), influence)
+
+
+def _each_way(identity: str, unit: str, values: Sequence[float], ways: Sequence[bool]) -> Estimate:
+    """Mean of repeats to and fro: both ways differ by what the machine is, and scatter is what steps of one way do."""
+    parts = [np.array([v for v, w in zip(values, ways, strict=True) if w == way]) for way in (True, False)]
+    parts = [p for p in parts if len(p)]
+    dof = sum(len(p) - 1 for p in parts)
+    pooled = math.sqrt(sum(float(((p - p.mean()) ** 2).sum()) for p in parts) / dof)
+    u = pooled * math.sqrt(sum(1 / len(p) for p in parts)) / len(parts)
+    influence = Influence(id=f"scatter/{identity}", name="scatter of the repeats", u=u, unit=unit, kind="A",
+                          distribution="normal", dof=float(dof), source=f"{len(values)} steps, each way by itself")  # fmt: skip
+    return Estimate.of(float(np.mean([p.mean() for p in parts])), influence)
 
 
 def _bound(identity: str, name: str, half: float, unit: str) -> Estimate:

@@ -15,9 +15,9 @@ from procedures.angle_step.steps import Done
 
 Array = npt.NDArray[np.float64]
 SMOOTH = 21  # ticks of the parabola that a peak is read from: keeps 99 % of one that lasts 4 ms, noise falls to a third
-DRAWS = 16  # of noise
+DRAWS = 8  # of noise
 ANSWERS = 0.5  # of its greatest: the torque current that answers a step
-BETWEEN = 0.1  # of a count: what an angle between two edges may be off
+BETWEEN = 0.05  # of a count: what a turning point between two edges may be off (0.02 rms of drawn swings)
 TOUCHES, SWING_S = (
     0.5,
     5e-3,
@@ -26,10 +26,11 @@ TOUCHES, SWING_S = (
 
 @dataclass(frozen=True)
 class Fine:
-    """Of one step: rise and settling s (`settling_off` s, what a tenth of a count in the band does to it), overshoot as a
-    share; peaks off the sensors' zero at the outboard sensor and at the motor, m, with their directions, and by how much noise
-    raises each; `slopes` rad/s at 10 and 90 %."""
+    """Of one step, `forward` or back: rise and settling s (`settling_off` s, what a twentieth of a count in the band does to
+    it), overshoot as a share; peaks off the sensors' zero at the outboard sensor and at the motor, m, with their directions, and by
+    how much noise raises each; `slopes` rad/s at 10 and 90 %."""
 
+    forward: bool
     rise: float
     settling: float
     settling_off: float
@@ -57,6 +58,7 @@ def fine(done: Done, swing: Swing, band: float, count: float, noise: float) -> F
     peak, towards, floor = _peak(swing.orbit, noise)
     motor, towards_motor, motor_floor = _peak(swing.motor, noise * swing.spread)
     return Fine(
+        forward=way > 0,
         rise=high - low,
         settling=settled - _answer(swing),
         settling_off=max(abs(s - settled) for s in (*near, *touching)),

@@ -23,7 +23,7 @@ from sim_backend.machines.tsbs.plant import TRACE, Plant
 from sim_backend.motion import AngleAsked, AngleCase
 
 Array = npt.NDArray[np.float64]
-REPLICAS = 3  # of the run, each in noise of its own
+REPLICAS = 2  # of the run, each in noise of its own
 SEGMENT_SATURATED = 2
 ANSWERS = 0.5  # of its greatest: the torque current that answers a step
 SWINGS_S, TAIL_S = 0.3, 0.3  # of a record: where the shaft is looked at closely, and where it stands again
