@@ -57,17 +57,25 @@ class Edges:
 
     def last_outside(self, target: float, band: float) -> float:
         """When the angle is last outside a band about a target, s; 0 where it never is."""
-        off = np.abs(self.y - target) - band
-        tops = [t for t, y in self.turning() if abs(y - target) > band]
-        beyond = np.flatnonzero(off > 0)
-        last = max(tops, default=0.0)
+        size = np.abs(self.y - target)
+        last = max((self._back(int(k), target, band) for k in np.flatnonzero(np.diff(self.y) == 0)), default=0.0)
+        beyond = np.flatnonzero(size > band)
         if not len(beyond):
             return last
         k = int(beyond[-1])
-        if k + 1 < len(self.t) and self.y[k + 1] != self.y[k]:
-            part = off[k] / (off[k] - off[k + 1])
+        if k + 1 < len(self.t):
+            part = (size[k] - band) / (size[k] - size[k + 1])
             return max(last, float(self.t[k] + part * (self.t[k + 1] - self.t[k])))
         return max(last, float(self.t[k]))
+
+    def _back(self, k: int, target: float, band: float) -> float:
+        """When the swing that turns between edges k and k + 1 comes back into the band, where it leaves it only between them; a
+        parabola about its end."""
+        (at, top), edge = self._top(k), abs(float(self.y[k]) - target)
+        height = abs(top - target)
+        if not height > band >= edge:
+            return 0.0
+        return at + float(self.t[k + 1] - at) * float(np.sqrt((height - band) / (height - edge)))
 
 
 def edges(t: Array, reading: Array, count: float) -> Edges:

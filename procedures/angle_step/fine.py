@@ -27,8 +27,8 @@ TOUCHES, SWING_S = (
 @dataclass(frozen=True)
 class Fine:
     """Of one step, `forward` or back: rise and settling s (`settling_off` s, what a twentieth of a count in the band does to
-    it), overshoot as a share; peaks off the sensors' zero at the outboard sensor and at the motor, m, with their directions, and by
-    how much noise raises each; `slopes` rad/s at 10 and 90 %."""
+    it), overshoot as a share; peaks off the sensors' zero at the outboard sensor and at the motor, m, with their directions,
+    and by how much noise raises each; `slopes` rad/s at 10 and 90 %."""
 
     forward: bool
     rise: float
