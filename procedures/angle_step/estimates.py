@@ -112,12 +112,12 @@ def _finer(
         return _each_way(f"{name}/{where}", unit, [of(x) for x in r], ways)
 
     slope = 1 / math.sqrt(np.mean([1 / x.slopes[0] ** 2 + 1 / x.slopes[1] ** 2 for x in r]))
-    between = _bound(f"encoder/{where}", "encoder between its counts", BETWEEN * count, "rad")
-    sampling = _bound(f"sampling/{where}", "sampling", tick / 2, "s")
-    band = _bound(f"encoder/settling/{where}", "encoder between its counts", max(x.settling_off for x in r), "s")
+    between = _bound(f"edges/{where}", "encoder between its counts", BETWEEN * count, "rad")
+    sampling = _bound(f"ticks/{where}", "sampling", tick / 2, "s")
+    band = _bound(f"edges/settling/{where}", "encoder between its counts", max(x.settling_off for x in r), "s")
+    raised = {"outboard": float(np.mean([x.floor for x in r])), "motor": float(np.mean([x.motor_floor for x in r]))}
     noise, motor_noise = (
-        _bound(f"noise/{where}", "noise in a peak", raised / 2, "m") - raised
-        for raised in (float(np.mean([x.floor for x in r])), float(np.mean([x.motor_floor for x in r])))
+        _bound(f"raised/{plane}/{where}", "noise in a peak", by / 2, "m") - by for plane, by in raised.items()
     )
     outboard = _gained(r, lambda x: x.towards, lambda x: x.peak, {"xo": 1.0, "yo": 1.0}, gains)
     rest = _each_way(f"standstill/{where}", "m", [x.rest_peak for x in still], ways)
