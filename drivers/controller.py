@@ -213,6 +213,10 @@ class Controller:
         """READY to LEVITATED."""
         self._command("LEVITATE", "LEVITATED", self._lift_s() + 6.0, self._lift_s(0.0))
 
+    def lift(self) -> None:
+        """READY to LIFTING: as `levitate`, without waiting for its end."""
+        self._command("LEVITATE", "LIFTING", 1.0)
+
     def land(self) -> None:
         """LEVITATED to READY."""
         self._command("LAND", "READY", self._lift_s() + 3.0, self._lift_s(0.0))

@@ -54,6 +54,7 @@ class Levitation(Protocol):
     def state(self) -> RigState: ...
     def enable(self) -> None: ...  # OFF -> READY
     def levitate(self) -> None: ...  # READY -> LEVITATED
+    def lift(self) -> None: ...  # READY -> lifting; waits for no end: it may take what a procedure has yet to do
     def land(self) -> None: ...  # LEVITATED -> READY
     def disable(self) -> None: ...  # READY -> OFF
     def set(self, parameter: str, value: float) -> None: ...  # SI; passes the envelope; read back

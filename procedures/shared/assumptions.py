@@ -79,6 +79,11 @@ SLEW = (
     "the errors of tracking by as much of the amplitude. It is found beyond the error that the torque current allows at the "
     "slowest frequency, some 0.2 %.",
 )
+LIFT_OFF = (
+    "Segment current sensors whose readings bend: what is 1 % more at 10 A than at 4 A changes the prediction by 0.1° at 2.5°, "
+    "and more where the angle is smaller; the angle that is measured stays.",
+    "A load that changes between the ring and the hold, such as a weight that is lifted off with the shaft.",
+)
 MAXIMUM_SPEED = (
     "Time is the controller's: a clock that is fast by 1e-4 makes both speeds slower by that share, and B greater.",
     "The drag at speed is that of the spindown: heat or a seal that changes B by 1 % since changes the expected speeds by 1 %, "
@@ -111,4 +116,7 @@ BALANCE = (
     "A laboratory balance that weighs every weight wrong by one share changes the unbalance by that share; corrections that "
     "are weighed on it are right all the same.",
     "Runout that changes with speed reads as unbalance: 2 µm at 10 000 r/min as some 1 g mm, as found and as left.",
+)
+LOAD_BALANCING = (
+    "Segment current sensors whose readings bend: 0.1 % of 10 A at 7 A and nothing at 5 A changes the reduction by 0.1 points.",
 )

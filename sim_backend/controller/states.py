@@ -81,14 +81,19 @@ class States:
 
     def _lifting(self, rows: core.Array) -> None:
         plant = self._plant
-        lifted = getattr(plant, "lifted", None) or self._machine.radial  # a plant may lift one end alone
-        still = bool((np.abs(rows[:, lifted]) < SETTLED_M).all()) and plant.moved
+        still = bool((np.abs(rows[:, self._machine.radial]) < SETTLED_M).all()) and plant.moved
         self._steady = self._steady + len(rows) if still else 0
         if self._steady * plant.period_ticks * plant.tick_s >= SETTLED_S:
             plant.mode = core.LEVITATE
             self._enter("LEVITATED")
-        elif (plant.tick - self._since) * plant.tick_s > LIFT_TIMEOUT_S + self._own["lift_time_s"]:
+        elif (plant.tick - self._since) * plant.tick_s > self._patience_s:
             self.fail("LIFT_TIMEOUT")
+
+    @property
+    def _patience_s(self) -> float:
+        """How long a lift may take: a plant may ask for more, where what lifts has to be turned on gradually."""
+        more: float = getattr(self._plant, "lift_timeout_s", LIFT_TIMEOUT_S)
+        return more + self._own["lift_time_s"]
 
     def _landing(self) -> None:
         plant = self._plant

@@ -13,25 +13,35 @@ from sim_backend.machines.tsbs.params import PlantParams
 CONTACT_O = 8
 
 
-def lifted(settings: Mapping[str, float]) -> Host:
-    """A host whose controller has been told that at rest, and holds the rotor."""
+BY_MOTOR = {"lift_by": 1.0, "allocation": 1.0, "lift_time_s": 0.5}
+
+
+def lifted(settings: Mapping[str, float], state: str = "LEVITATED") -> Host:
+    """A host whose controller has been told that at rest, and has been asked to lift 2 s ago."""
     host = Host()
     assert host.command("ENABLE") == "OK"
     for name, value in settings.items():
         assert host.set(name, value)[0] == "OK"
     assert host.command("LEVITATE") == "OK"
     host.run(2.0)
-    assert host.device.state == "LEVITATED"
+    assert host.device.state == state
     return host
 
 
-def test_the_inboard_end_alone_decides_when_the_motor_lifts() -> None:
+def on_its_ring(host: Host) -> bool:
+    flags = host.telemetry(0.5)["flags"].astype(int)
+    return bool((flags & CONTACT_O).all())
+
+
+def test_an_end_on_its_ring_is_not_levitated() -> None:
     """At gamma 0 the outboard end stays on its ring; 3.5 degrees lift it, 0 keeps it up, and a landing puts it down."""
-    host = lifted({"lift_by": 1.0, "allocation": 1.0})
-    assert (host.telemetry(0.5)["flags"].astype(int) & CONTACT_O).all()
+    host = lifted(BY_MOTOR, "LIFTING")
+    assert on_its_ring(host)
+    assert host.command("LAND") == "WRONG_STATE"
     assert host.set("gamma_slew", math.radians(2.0))[0] == "OK"
     host.set("gamma", math.radians(3.5))
     host.run(3.0)
+    assert host.device.state == "LEVITATED"
     host.set("gamma", 0.0)
     host.run(3.0)
     held = host.telemetry(0.1)
@@ -40,6 +50,36 @@ def test_the_inboard_end_alone_decides_when_the_motor_lifts() -> None:
     assert host.command("LAND") == "OK"
     host.run(2.0)
     assert (host.device.state, host.device.fault) == ("READY", "NONE")
+
+
+def test_a_lift_that_does_not_come_about_is_set_down_when_it_is_asked_for() -> None:
+    host = lifted(BY_MOTOR, "LIFTING")
+    assert host.command("MAKE_SAFE") == "OK"
+    assert host.device.state == "LANDING"
+    host.run(1.0)
+    assert (host.device.state, host.device.fault) == ("OFF", "NONE")
+    assert max(host.device.plant.currents) < 1e-3  # type: ignore[attr-defined]
+
+
+def test_a_lift_whose_host_dies_is_set_down() -> None:
+    host = lifted(BY_MOTOR, "LIFTING")
+    host.beating = False
+    host.run(0.2)
+    assert (host.device.state, host.device.fault) == ("LANDING", "HEARTBEAT_LOST")
+    host.run(1.0)
+    assert host.device.state == "FAULT"
+    assert max(host.device.plant.currents) < 1e-3  # type: ignore[attr-defined]
+
+
+def test_a_lift_by_the_motor_may_take_a_minute_and_one_by_the_bearings_five_seconds() -> None:
+    host = lifted(BY_MOTOR, "LIFTING")
+    host.run(57.0)
+    assert (host.device.state, host.device.fault) == ("LIFTING", "NONE")
+    host.run(2.0)
+    assert (host.device.state, host.device.fault) == ("FAULT", "LIFT_TIMEOUT")
+    weak = lifted({"kp_o": 0.0, "kd_o": 0.0, "ki_o": 0.0}, "LIFTING")
+    weak.run(4.5)
+    assert weak.device.fault == "LIFT_TIMEOUT"
 
 
 @pytest.mark.parametrize("name", ["lift_by", "model_mass"])

@@ -12,10 +12,11 @@ import numpy.typing as npt
 from bench.rigfile import RigFile
 from bench.rigfile.toleranced import Toleranced
 from sim_backend.machine import Machine, Truth
+from sim_backend.machines.tsbs import liftoff
 from sim_backend.machines.tsbs import quantities as of
 from sim_backend.machines.tsbs.motions import MOTIONS
 from sim_backend.machines.tsbs.operator import SimulatedOperator
-from sim_backend.machines.tsbs.params import PlantParams, beta_of
+from sim_backend.machines.tsbs.params import ControlParams, PlantParams, beta_of
 from sim_backend.machines.tsbs.plant import CHANNELS, TRACE, Plant
 from sim_backend.spoken import channels_by_reading
 
@@ -31,12 +32,18 @@ DEFECTS = {
     "mass_error_M4": 0.0, "hanger_off_at_zero": 0.0, "drop_fraction": 0.0, "integrator_factor": 1.0, "dead_after_s": 0.0,
     "fault_after_s": 0.0, "drive_fault_after_s": 0.0, "exchange_segments": 0.0, "segment_sign_1": 1.0,
     "encoder_sign": 1.0, "lever_slip": 0.0, "segment_scale_drift": 0.0, "drive_brakes": 0.0, "factor_gamma": 1.0,
+    "factor_balance": 1.0, "factor_gamma_max": 1.0, "factor_model_alpha_d": 1.0,
+    "factor_model_alpha_c": 1.0, "factor_model_stiffness": 1.0, "factor_circle_radius": 1.0,
     "factor_kp_theta": 1.0, "factor_kd_theta": 1.0, "factor_sine_amplitude": 1.0, "factor_angle_ref": 1.0,
+    "factor_gamma_slew": 1.0, "ring_friction": 0.1, "contact_silent": 0.0, "weight_left_kg": 0.0,
     "factor_lag_compensation": 1.0, "factor_segment_max": 1.0, "kept_allocation": 0.0,
 }  # fmt: skip
 """Planted defects and their harmless values. Mass errors are relative; `factor_...` is what the controller makes of a
 parameter, over what it was told; `kept_...` is what it keeps to instead; `segment_scale_drift` is relative, 1/s, of all four
-segments' sensors."""
+segments' sensors.
+Of `factor_balance` 2 wraps the load's line, 3 turns phi's sign round, 4 has an observer of currents without limits."""
+
+CONTACT = 4 | 8  # of the flags, inboard and outboard
 
 DAILY = frozenset(
     ("site.air_density", *(f"drift_{k}" for k in range(len(COILS))), *(f"segment_drift_{k}" for k in range(4)))
@@ -115,6 +122,7 @@ def _carried(v: Mapping[str, float], d: Mapping[str, float]) -> PlantParams:
         brake=v.get("drive_drag", 0.0) + d["drive_brakes"],
         lever_slip=d["lever_slip"],
         clearance=v["geometry.clearance"],
+        ring_friction=d["ring_friction"],
         coil_limit=tuple(limit),
         lost_radius=0.92 * v["geometry.clearance"],
     )
@@ -175,7 +183,8 @@ def _sensed(
 
 def quantities(p: PlantParams, settings: Mapping[str, float]) -> dict[str, float]:
     """The true quantities, for the bias among the controller's parameters."""
-    return of.quantities(p, (settings["bias_i"], settings["bias_o"]))
+    most = settings.get("segment_max", ControlParams.segment_max)
+    return of.quantities(p, (settings["bias_i"], settings["bias_o"])) | liftoff.quantities(p, most)
 
 
 def make(p: PlantParams, seed: int, substeps: int) -> Plant:
@@ -184,7 +193,9 @@ def make(p: PlantParams, seed: int, substeps: int) -> Plant:
 
 
 def operator(rig: RigFile, plant: Plant, truth: Truth) -> SimulatedOperator:
-    """Who works on it."""
+    """Who works on it. What somebody has left hanging hangs on the hook from the start."""
+    if left := truth.defects["weight_left_kg"]:
+        plant.load(left, left * truth.plant.gravity, 0.0)
     return SimulatedOperator(plant, truth, rig.hook_seat.half_width or 0.0)
 
 
@@ -219,6 +230,8 @@ def places(
 
 def spoil(values: Array, at: Mapping[str, int], defects: Mapping[str, float], first: str = SEGMENTS[0]) -> None:
     """Put planted defects of sensors into telemetry (n, signals), and the angle within a turn. `first`: one of the segments."""
+    if defects["contact_silent"]:
+        values[:, at["flags"]] = values[:, at["flags"]].astype(np.int64) & ~CONTACT
     values[:, at[first]] *= defects["segment_sign_1"]
     if defects["stuck_current_yo_p"]:
         values[:, at["i_yo_p"]] = 4.0

@@ -60,10 +60,10 @@ class Plant(CorePlant):
         _lib.tsbs_start(self._p, self._c, self._s, seed & (2**64 - 1))
 
     @property
-    def lifted(self) -> slice | None:
-        """Columns that a lift brings to rest, if not all radial ones. An end that the motor lifts may stay on its ring; the
-        shaft is then inclined, and of the inboard sensors, which are beside the bearing, only the horizontal one reads 0."""
-        return slice(0, 1) if self._c.lift_by else None
+    def lift_timeout_s(self) -> float:
+        """How much longer than its own time a lift may take, s. An end that the motor lifts may have to wait on its ring until
+        its field has been turned so far that it can."""
+        return 60.0 if self._c.lift_by else 5.0
 
     @property
     def speed(self) -> float:
