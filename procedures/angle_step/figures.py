@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -94,25 +94,29 @@ def _peaks(results: Mapping[Case, Result]) -> Iterator[Figure]:
     """Excess over the size of the step, and over the filter where there are several."""
     filters = sorted({c.filter_hz for c in results})
     sizes = sorted({c.size for c in results})
-    allocations = list(dict.fromkeys(c.allocation for c in results))
+    each: dict[str, list[Result]] = {}
+    for case, result in results.items():
+        each.setdefault(case.allocation, []).append(result)
     if len(sizes) > 1:
         yield Figure("excess-size", "Excursion over the size of the step",
                      f"Peak at the outboard sensor above that at standstill, mean of the repeats with its 95 % interval; "
                      f"derivative filtered at {filters[0]:g} Hz.", "step (°)", "excess (µm)",
-                     tuple(_excess(a, [results[Case(a, s, filters[0])] for s in sizes], np.degrees(sizes))
-                           for a in allocations))  # fmt: skip
+                     tuple(_excess(a, [r for r in by if r.case.filter_hz == filters[0]], lambda case: np.degrees(case.size))
+                           for a, by in each.items()))  # fmt: skip
     if len(filters) > 1:
         yield Figure("excess-filter", f"Excursion over the derivative's filter, step of {np.degrees(sizes[0]):g}°",
                      "Peak at the outboard sensor above that at standstill, mean of the repeats with its 95 % interval.",
                      "log10 of the filter's frequency (Hz)", "excess (µm)",
-                     tuple(_excess(a, [results[Case(a, sizes[0], f)] for f in filters], np.log10(filters))
-                           for a in allocations))  # fmt: skip
+                     tuple(_excess(a, [r for r in by if r.case.size == sizes[0]], lambda case: np.log10(case.filter_hz))
+                           for a, by in each.items()))  # fmt: skip
 
 
-def _excess(label: str, results: Sequence[Result], x: np.ndarray) -> Series:
+def _excess(label: str, results: Sequence[Result], of: Callable[[Case], float]) -> Series:
     found = [r.estimates["excess"] for r in results]
     u = np.array([coverage_factor(len(r.responses) - 1) * e.u for r, e in zip(results, found, strict=True)])
-    return Series(label, np.asarray(x, np.float64), np.array([1e6 * e.value for e in found]), "both", 1e6 * u)
+    return Series(
+        label, np.array([float(of(r.case)) for r in results]), np.array([1e6 * e.value for e in found]), "both", 1e6 * u
+    )
 
 
 def _shown(done: Done) -> slice:
