@@ -13,29 +13,44 @@ from procedures.angle_step.estimates import Result
 from procedures.angle_step.steps import Case, Done
 from procedures.servomotor.parameters import stated
 
+FIRST = ("torque-priority", "radius", "orbit")
 SHOWN_S = 0.25  # after the step: the angle has swung by then, and the rotor is back
 
 
 def all_figures(moves: Sequence[Done], results: Mapping[Case, Result], rig: RigFile) -> list[Figure]:
-    """In the order of the report."""
+    """In the order of the report: where captures show the torque current in its bound, that and the excursion first."""
     first = {done.case: done for done in reversed(moves)}  # the first move of each case
     cases = [c for c in results if c.filter_hz == next(iter(results)).filter_hz]
-    largest = [c for c in cases if c.size == max(x.size for x in cases)]
+    sizes = {a: max(c.size for c in cases if c.allocation == a) for a in dict.fromkeys(c.allocation for c in cases)}
+    largest = [c for c in cases if c.size == sizes[c.allocation]]
     limit = stated(rig, "motor.segment_limit").high
-    return [
+    drawn = [
         _orbits([first[c] for c in largest], rig.geometry["clearance"].value),
         *(_angles([first[c] for c in cases if c.size == size]) for size in sorted({c.size for c in cases})),
         _radii([first[c] for c in largest]),
         *(figure for c in largest for figure in _currents(first[c], limit)),
         *_peaks(results),
     ]
+    return (
+        sorted(drawn, key=lambda f: FIRST.index(f.key) if f.key in FIRST else len(FIRST)) if moves[0].swing else drawn
+    )
+
+
+def _called(done: Done, moves: Sequence[Done]) -> str:
+    """By its allocation, and by its size where the moves beside it have another."""
+    alike = all(d.case.size == done.case.size for d in moves)
+    return done.case.allocation if alike else f"{done.case.allocation}, {_deg(done)}"
+
+
+def _sizes(moves: Sequence[Done]) -> str:
+    return f"step of {' and of '.join(dict.fromkeys(_deg(d) for d in moves))}"
 
 
 def _orbits(moves: Sequence[Done], clearance: float) -> Figure:
     turn = np.linspace(0, 2 * np.pi, 181)
     circle = Series("clearance", 1e6 * clearance * np.cos(turn), 1e6 * clearance * np.sin(turn))
-    series = [Series(d.case.allocation, 1e6 * d.move.orbit[0], 1e6 * d.move.orbit[1]) for d in moves]
-    return Figure("orbit", f"Orbit at the outboard sensor, step of {_deg(moves[0])}",
+    series = [Series(_called(d, moves), 1e6 * d.move.orbit[0], 1e6 * d.move.orbit[1]) for d in moves]
+    return Figure("orbit", f"Orbit at the outboard sensor, {_sizes(moves)}",
                   "Path of the shaft off the sensors' zero after one step, within the circle at which it would touch (as T "
                   "Fig. 6.7b).", "x (µm)", "y (µm)", (*series, circle), kind="plane")  # fmt: skip
 
@@ -53,10 +68,10 @@ def _angles(moves: Sequence[Done]) -> Figure:
 
 def _radii(moves: Sequence[Done]) -> Figure:
     series = tuple(
-        Series(d.case.allocation, 1e3 * d.move.t[_shown(d)], 1e6 * np.hypot(*d.move.orbit[:, _shown(d)])) for d in moves
+        Series(_called(d, moves), 1e3 * d.move.t[_shown(d)], 1e6 * np.hypot(*d.move.orbit[:, _shown(d)])) for d in moves
     )
     rest = float(1e6 * max(np.hypot(*d.move.rest_orbit).max() for d in moves))
-    return Figure("radius", f"Distance off centre, step of {_deg(moves[0])}",
+    return Figure("radius", f"Distance off centre, {_sizes(moves)}",
                   "At the outboard sensor, over the time since the step; the line is the greatest at standstill before it.",
                   "time (ms)", "off centre (µm)", series, lines=(("standstill", rest),))  # fmt: skip
 

@@ -28,7 +28,8 @@ def test_a_step_of_15_degrees_on_a_served_rig(tmp_path: Path, planted: str) -> N
     serious = [f["code"] for f in record["findings"] if f["effect"] != "note" and f["code"] not in processes.EXPECTED]
     assert states[-1].endswith("-> OFF")
     if planted:
-        assert (status, record["outcome"], serious[0]) == (3, "ERROR", "motor-frame"), record["findings"]
+        assert (status, record["outcome"]) == (3, "ERROR"), record["findings"]
+        assert "motor-frame" in serious
         return
     assert (status, serious) == (0, []), record["findings"]
     found = {(m["name"], m["where"]): m["value"] for m in record["measurements"]}

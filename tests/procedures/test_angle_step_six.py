@@ -70,7 +70,7 @@ def test_at_15_degrees_priority_leaves_a_tenth_at_most(nominal_run: Simulated) -
 
 def test_its_figures_show_torque_within_its_bound(nominal_run: Simulated) -> None:
     drawn = list(procedure.drawn(nominal_run.recording))
-    assert [f.key for f in drawn] == ["orbit", "angle-15", "radius", "torque-static", "amplitudes-static", "torque-priority",
+    assert [f.key for f in drawn] == ["torque-priority", "radius", "orbit", "angle-15", "torque-static", "amplitudes-static",
                                       "amplitudes-priority"]  # fmt: skip
     for figure in drawn:
         draw_figure(figure)

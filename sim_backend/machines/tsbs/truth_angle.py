@@ -127,7 +127,8 @@ class _Carried:
         return float(np.mean(angles)), np.concatenate(rows)
 
     def _recorded(self, seconds: float) -> _Seen:
-        """What the shaft does, from its state every millisecond: it moves smoothly in between."""
+        """What the shaft does, from its state every millisecond: it moves smoothly in between (looked at three times
+        as often, peaks are 0.1 % higher)."""
         from scipy import interpolate
 
         states, rows, trace = [self.plant.state()["s"]], [], []
