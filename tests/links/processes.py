@@ -127,7 +127,9 @@ def patient_rig(folder: Path, rig: str = "tsbs12", patience_s: float = PATIENCE_
     (rigs / f"{rig}.toml").write_text(
         re.sub(r"(watchdog_s = .*?default = )[0-9.]+(, .*?high = )[0-9.]+", patient, text)
     )
-    (rigs / f"{rig}.dbc").write_bytes((ROOT / "rigs" / f"{rig}.dbc").read_bytes())
+    own = ROOT / "rigs" / f"{rig}.dbc"
+    if own.exists():
+        (rigs / own.name).write_bytes(own.read_bytes())
 
 
 @contextmanager
