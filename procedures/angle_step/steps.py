@@ -19,7 +19,6 @@ from procedures.servomotor.parameters import parameter
 
 Array = npt.NDArray[np.float64]
 STEP = "move"
-LATE_A = 1.0  # of torque current, which a count of the encoder at rest does not make of a millisecond
 ANSWER_A = 0.2  # of torque current: well above its noise, a twentieth of the smallest sensible step's
 
 
@@ -91,8 +90,7 @@ def _read(recording: Recording[Any], step: Step, machine: Servomotor, share: flo
                if e["name"] == reference and step.start_ns <= e["t_ns"] < step.end_ns]  # fmt: skip
     if not written:
         raise AnalysisError(f"move {dict(step.labels)}: found no write of the angle's reference within it")
-    torque = np.mean([data[c] for c in machine.turning], axis=0)
-    rest = standing(torque, data["t_ns"] < written[-1])
+    rest = data["t_ns"] < written[-1]
     if rest.sum() < 20 or (~rest).sum() < 100:
         raise AnalysisError(f"move {dict(step.labels)}: found {int(rest.sum())} samples before it and "
                             f"{int((~rest).sum())} after; expected at least 20 and 100")  # fmt: skip
@@ -110,16 +108,6 @@ def _read(recording: Recording[Any], step: Step, machine: Servomotor, share: flo
         read_swing(recording, labels.get("number")),
         float(labels["target_rad"]),
     )
-
-
-def standing(torque: Array, rest: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """Samples (n,) before the step, of those before its write was answered: over a link that is late the answer comes after the
-    torque current, A, which is then beyond half its greatest already."""
-    early = np.flatnonzero(rest & (np.abs(torque) > max(float(np.abs(torque).max()) / 2, LATE_A)))
-    if not len(early):
-        return rest
-    before: npt.NDArray[np.bool_] = rest & (np.arange(len(rest)) < early[0] - 1)
-    return before
 
 
 def _move(

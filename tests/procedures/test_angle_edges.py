@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 from procedures.angle_step import fine
 from procedures.angle_step.edges import edges
-from procedures.angle_step.steps import standing
 
 Array = npt.NDArray[np.float64]
 COUNT = 2 * math.pi / 4096
@@ -77,11 +76,3 @@ def test_a_peak_is_freed_of_what_noise_adds(height: float) -> None:
         assert towards == pytest.approx((0.0, 1.0), abs=0.15)
     assert abs(np.mean(off)) < 0.35 * np.mean(kept) + 0.005 * height
     assert np.mean(kept) > 2e-8 or height > 1e-5
-
-
-def test_a_write_that_is_answered_late_is_no_standstill() -> None:
-    """Torque from sample 300 on, answered at 340; on time nothing changes."""
-    torque = np.where(np.arange(600) < 300, 0.3, 6.0)
-    late, punctual = np.arange(600) < 340, np.arange(600) < 300
-    assert standing(torque, late).sum() == 299
-    assert standing(torque, punctual) is punctual
