@@ -18,7 +18,8 @@ from bench.rigfile import load_rig
 RPM = math.pi / 30
 RIGS = {
     "tsbs12": ("amb-calibration", "force-constant", "negative-stiffness", "force-coupling", "torque-constant", "spindown",
-               "angle-step", "lift-off", "slew", "force-map"),
+               "angle-step", "lift-off", "slew", "force-map", "load-balancing"),
+    "tsbs12-offset": ("load-balancing",),
     "tsbs12-drag": ("maximum-speed",),
     "amb5dof": ("bearing-model", "step", "tracking", "unbalance", "compensation", "balance", "run-up", "coast-down",
                 "sensitivity"),
