@@ -124,11 +124,9 @@ def _angles(gammas: Array, slope: float, ripple_N: tuple[float, float], plan: Pl
     """Half difference and mean of both angles, each from what the repeats gave; `slope` N/rad, `ripple_N` in each."""
     out = {}
     early = Estimate.of(EARLY_N, _bound("lift/early", "motion at the threshold", EARLY_HALF_N, "N"))
-    early = early + Estimate.of(0.0, _bound("lift/ripple", "ripple of the force off the home angle", ripple_N[0], "N"))
+    early = early + Estimate.of(0.0, _product("lift/ripple", ripple_N[0]))
     aside = Estimate.of(0.0, _bound("lift/aside", "motion at the threshold, one way", ASIDE_N, "N"))
-    aside = aside + Estimate.of(
-        0.0, _bound("lift/ripple-aside", "ripple of the force off the home angle", ripple_N[1], "N")
-    )
+    aside = aside + Estimate.of(0.0, _product("lift/ripple-aside", ripple_N[1]))
     late = Estimate.of(0.0, _bound("lift/write", "when gamma begins to turn", WRITE_S * plan.rate_rad_s, "rad"))
     ways: tuple[tuple[str, Array, Estimate], ...] = (
         ("gamma_lift", (gammas[:, 1] - gammas[:, 0]) / 2, early * (1 / slope) + late if slope > 0 else late),
@@ -142,6 +140,12 @@ def _angles(gammas: Array, slope: float, ripple_N: tuple[float, float], plan: Pl
         total = Estimate(float(values.mean()), "rad", {scatter: 1.0} if u else {}) + more
         out[name] = Estimate(total.value, "rad", total.sensitivities)
     return out
+
+
+def _product(identity: str, half_N: float) -> Influence:
+    """Of ripple times angle, each anywhere within its range: small values are likelier."""
+    name = "ripple of the force off the home angle"
+    return Influence(identity, name, half_N / math.sqrt(6), "N", "B", "triangular")
 
 
 def _bound(identity: str, name: str, half: float, unit: str) -> Influence:

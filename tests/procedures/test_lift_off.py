@@ -20,6 +20,7 @@ from bench.uncertainty import interval
 from procedures.lift_off import fit
 from procedures.lift_off.plan import Plan
 from procedures.lift_off.procedure import check, procedure
+from procedures.servomotor.conventions import conventions
 from sim_backend.machines.tsbs import liftoff
 from sim_backend.machines.tsbs.params import PlantParams
 from sim_backend.truth import nominal
@@ -222,8 +223,9 @@ def test_the_printed_order_on_the_nominal_stand(tmp_path: Path) -> None:
     for r, lifted in zip(a.ramps, a.lifted, strict=True):
         assert lifted is not None
         assert np.degrees(abs(r.gamma[lifted])) < 1.5
-        assert r.i_y[r.t < 0].min() > 9.9  # on its ring at gamma 0
-        assert r.touches[r.t < 0].all()
+    assert a.dwells.stack(conventions(run.recording.rig).segments)[0].min() > 9.9  # i_y is saturated at gamma 0
+    assert {labels.kind for labels in a.dwells.labels} == {"dwell"}
+    assert (a.dwells.flags & conventions(run.recording.rig).contact_outboard).all()
 
 
 @pytest.mark.long
@@ -242,7 +244,11 @@ def test_drawn_stands_end_as_their_own_prediction_says(tmp_path: Path, seed: int
 
 @pytest.mark.parametrize(
     ("plan", "said"),
-    [({"gamma_max_rad": 0.2}, "goes from"), ({"back_rad_s": 0.002}, "ascending"), ({"rate_rad_s": 0.001}, "at most 55")],
+    [
+        ({"gamma_max_rad": 0.2}, "goes from"),
+        ({"back_rad_s": 0.002}, "ascending"),
+        ({"rate_rad_s": 0.001}, "at most 55"),
+    ],
 )
 def test_what_cannot_work_is_told_before_anything_starts(plan: dict[str, float], said: str) -> None:
     rig = load_rig("tsbs12")
@@ -252,12 +258,14 @@ def test_what_cannot_work_is_told_before_anything_starts(plan: dict[str, float],
 
 def test_figures_show_position_and_currents(sound: Simulated) -> None:
     drawn = {f.key: f for f in procedure.drawn(sound.recording)}
-    assert set(drawn) == {"position", "currents"}
+    assert set(drawn) == {"position", "lifts", "currents"}
     position = drawn["position"]
     bars = [s for s in position.series if s.style == "both"]
     assert len(bars) == 2
     lifted = math.degrees(estimates(sound)["gamma_lift"].value + estimates(sound)["gamma_zero"].value)
     assert bars[1].x.min() - 0.03 < lifted < bars[1].x.max() + 0.03
+    mean, predicted = drawn["lifts"].series[1:]
+    assert abs(mean.y[0] - predicted.y[0]) < 1.5 * np.hypot(mean.u[0], predicted.u[0])
 
 
 def test_measured_come_by_their_names(sound: Simulated) -> None:
