@@ -38,6 +38,7 @@ PROCEDURES = (
     _room("angle-step", "Angle step while the motor carries: static against priority currents"),
     _room("maximum-speed", "Maximum speed at the torque limit with two ways of sharing the segments"),
     _room("step", "Set-point steps of the levitated shaft, with two settings of the controller compared"),
+    _room("load-balancing", "Active load balancing on a circle: the largest current with and without it"),
     _room("lift-off", "Phase angle from which on the motor lifts its end from the ring"),
     _room("slew", "Following a slow sine of the angle, with detent"),
     _room("bearing-model", "Force constants and magnetic offsets of the radial AMBs"),

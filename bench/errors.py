@@ -58,6 +58,14 @@ class ConfigError(BenchError):
         self.problems = problems
 
 
+class Unfit(ConfigError):
+    """A plan that cannot work by what is known of the machine, told before anything starts: `why`."""
+
+    def __init__(self, why: tuple[str, ...]) -> None:
+        super().__init__("\n  ".join(["the plan does not fit what is known of the rig; nothing was started:", *why]))
+        self.why = why
+
+
 class Lacking(ConfigError):
     """What a rig does not have, by the tables of its file: `lines`."""
 

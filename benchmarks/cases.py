@@ -18,8 +18,9 @@ from bench.rigfile import load_rig
 RPM = math.pi / 30
 RIGS = {
     "tsbs12": ("amb-calibration", "force-constant", "negative-stiffness", "force-coupling", "torque-constant", "spindown",
-               "angle-step", "lift-off", "slew", "force-map"),
-    "tsbs12-drag": ("spindown", "maximum-speed"),
+               "angle-step", "lift-off", "slew", "force-map", "load-balancing"),
+    "tsbs12-offset": ("load-balancing",),
+    "tsbs12-drag": ("maximum-speed",),
     "amb5dof": ("bearing-model", "step", "tracking", "unbalance", "compensation", "balance", "run-up", "coast-down",
                 "sensitivity"),
     "amb1dof": ("derivative", "estimator-compare"),
@@ -33,7 +34,7 @@ FOREIGN = {
 ENDS: Mapping[str, tuple[Mapping[str, Any], ...]] = {
     "amb-calibration": ({"bias_A": 2.5}, {"bias_A": 4.0}),
     "torque-constant": ({"bias_A": 2.0}, {"bias_A": 4.0}),
-    "spindown": ({"speed_rad_s": 30.0}, {"speed_rad_s": 70.0}, {"motor_carries": True, "run_up": "motor"}),
+    "spindown": ({"speed_rad_s": 30.0}, {"speed_rad_s": 70.0}),
     "maximum-speed": ({"limit_A": 7.0}, {"limit_A": 8.0}),
     "step": (
         {"speeds_rad_s": (3000 * RPM,)},
@@ -138,22 +139,30 @@ def load(name: str) -> Procedure:
     return found
 
 
-def needed(cases: list[Case]) -> list[str]:
+def needed(cases: list[Case]) -> dict[str, dict[str, Any]]:
     """As needed_by, for all of them."""
-    used = (needed_by(case.procedure, json.loads(case.changes)) for case in cases if case.chain)
-    return list(dict.fromkeys(name for names in used for name in names))
+    out: dict[str, dict[str, Any]] = {}
+    for case in cases:
+        if case.chain:
+            out = needed_by(case.procedure, json.loads(case.changes)) | out
+    return out
 
 
-def needed_by(procedure: str, changes: Mapping[str, Any] | None = None) -> list[str]:
-    """Procedures whose calibrations one uses, in the order in which they can be made."""
-    out: list[str] = []
+def needed_by(procedure: str, changes: Mapping[str, Any] | None = None) -> dict[str, dict[str, Any]]:
+    """Procedures whose calibrations one uses, in the order in which they can be made, with the switches that they are needed
+    at; the other settings that a need names are those of the default plans."""
+    out: dict[str, dict[str, Any]] = {}
 
     def add(name: str, changes: Mapping[str, Any]) -> None:
         procedure = load(name)
         for need in procedure.needs(procedure.plan.model_validate(changes)):
             if need.procedure not in out:
-                add(need.procedure, {})
-                out.append(need.procedure)
+                fields = load(need.procedure).plan.model_fields
+                switches = {
+                    k: bool(v) for k, v in need.settings.items() if k in fields and fields[k].annotation is bool
+                }
+                add(need.procedure, switches)
+                out[need.procedure] = switches
 
     add(procedure, changes or {})
     return out

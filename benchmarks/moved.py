@@ -53,13 +53,15 @@ QUICK: Mapping[str, Mapping[str, Any]] = {
     "force-coupling": {"settle_s": 0.3, "average_s": 0.2},
     "torque-constant": {"masses": ("M2", "M3"), "wiring_A": 0.5, "settle_s": 0.5, "average_s": 0.2},
     "spindown": {"repeats": 2, "speed_rad_s": 50},
+    "maximum-speed": {"repeats": 3, "average_s": 1.0, "dwell_s": 1.2},
     "balance": {"slow_s": 4.2, "dwell_s": 0.5, "capture_s": 0.3, "settle_s": 0.8, "speeds_rad_s": (10000 * RPM,)},
 }
 """Short plans; the others run with their defaults."""
 KINDS = {"position_gain_": "sensors/pos_{}/gain", "position_offset_": "sensors/pos_{}/offset", "amb_gap_": "geometry/amb_gap",
          "asymmetry_": "machine/amb_asymmetry/{}", "coupling_offset_": "machine/coupling_offset"}  # fmt: skip
 NAMES = {"hanger": "masses/hanger", "mass_density": "masses/density", "polar_inertia": "machine/polar_inertia",
-         "ring_inertia": "machine/ring_inertia", "roll": "machine/radial_axes"}  # fmt: skip
+         "ring_inertia": "machine/ring_inertia", "roll": "machine/radial_axes", "beta_4": "machine/torque_ripple",
+         **{f"segment_gain_{k}": f"machine/segment_gain/{k + 1}" for k in range(4)}}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -104,9 +106,9 @@ def attempt(procedure: str, rig: str, seed: int, truth: Mapping[str, float], fol
     """
     known: dict[str, Calibration] = {}
     path = folder / "recording.mcap"
-    for name in (*needed_by(procedure), procedure):
+    for name, switches in {**needed_by(procedure), procedure: {}}.items():
         path.unlink(missing_ok=True)
-        done = simulated_run(name, rig, seed, QUICK.get(name, {}), path, truth, known)
+        done = simulated_run(name, rig, seed, {**QUICK.get(name, {}), **switches}, path, truth, known)
         if name != procedure:
             if serious(done):
                 raise BenchError(f"{name}: {', '.join(serious(done))}")

@@ -77,14 +77,15 @@ def limit_of(case: Case, asked: argparse.Namespace) -> int:
 
 
 def run_rig(rig: str, seed: int, cases: list[Case], file: Path) -> None:
-    """The cases on one virtual rig; the calibrations that any of them uses are made first, with default plans. Each is a line
-    of the file as soon as it has ended: one write, so that processes do not mix theirs."""
+    """The cases on one virtual rig; the calibrations that any of them uses are made first, with default plans and
+    the switches that they are needed at. Each is a line of the file as soon as it has ended: one write, so that processes do
+    not mix theirs."""
     known: dict[str, Calibration] = {}
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "recording.mcap"
-        for name in needed(cases):
+        for name, switches in needed(cases).items():
             try:
-                known[name] = attempt(rig, name, seed, {}, path, known).calibration()
+                known[name] = attempt(rig, name, seed, switches, path, known).calibration()
             except BenchError:
                 continue  # the cases that need it say so
         for case in cases:

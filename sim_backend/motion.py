@@ -84,6 +84,26 @@ class CompareAsked:
 
 
 @dataclass(frozen=True)
+class CircleAsked:
+    """A motor that carries one end of the shaft along a circle, `radius` m at `hz` (negative: the other way round), reached in
+    `ramp_s`, and balances its load from the phase `engage_rad` on. `settings` as those of steps; what is written on top when
+    it begins to carry, to go around and to balance; `slew` rad/s and `balanced_limit` rad of the phase angle. `branches`: of
+    each repeat, the sign of i_x as against that of i_y."""
+
+    settings: Numbers
+    carried: Numbers
+    circled: Numbers
+    balanced: Numbers
+    radius: float
+    hz: float
+    ramp_s: float
+    engage_rad: float
+    slew: float
+    balanced_limit: float
+    branches: Sequence[int]
+
+
+@dataclass(frozen=True)
 class AngleCase:
     """Steps of one size, rad: the `settings` written before them, the band of settling, rad, and if the law has a bound."""
 
@@ -146,6 +166,7 @@ class Motions:
         band: what the watched estimator does, by name and line (an empty text where it is none's).
         compare: what estimators do in the loop, by quantity and name, and ratios of two.
         peak: of settings, an axis' number and a speed, the greatest sensitivity and where, Hz, of the shaft that turns.
+        circle: balancing of loads on a circle, by quantity and place.
         angle: what steps of the angle show, by quantity and case.
         drag: what stops the shaft that coasts, by the names of a spindown: B and B_high N m s/rad, T_c N m, J_z kg m^2.
         speeds: at the torque limit, by sharing: `speed` rad/s, `bound` A of the torque current, `ripple` rad/s.
@@ -159,6 +180,7 @@ class Motions:
     loop: Callable[[RigFile, Any, Numbers, Sequence[str]], Any] | None = None
     peak: Callable[[RigFile, Any, Numbers, int, float], tuple[float, float]] | None = None
     compare: Callable[[RigFile, Any, CompareAsked], Mapping[tuple[str, str], float]] | None = None
+    circle: Callable[[RigFile, Any, CircleAsked], Mapping[tuple[str, str], float]] | None = None
     angle: Callable[[RigFile, Any, AngleAsked], Mapping[tuple[str, str], float]] | None = None
     drag: Callable[[Any, DragAsked], Mapping[str, float]] | None = None
     band: Callable[[RigFile, Any, BandAsked], Mapping[tuple[str, float | None], float]] | None = None

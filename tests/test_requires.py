@@ -20,7 +20,7 @@ from bench.rigfile.roles import resolved
 
 OF = {
     "tsbs12": ("amb-calibration", "force-constant", "negative-stiffness", "force-coupling", "torque-constant", "spindown",
-               "angle-step", "maximum-speed", "slew", "force-map"),
+               "angle-step", "maximum-speed", "load-balancing", "lift-off", "slew", "force-map"),
     "tsbs6": ("amb-calibration", "torque-constant", "spindown", "angle-step", "slew"),
     "amb5dof": ("spindown", "step", "bearing-model", "tracking", "unbalance", "compensation", "balance", "run-up", "coast-down",
                 "sensitivity"),

@@ -245,6 +245,37 @@ def _compare(done: Simulated) -> Found:
         yield name, where, value
 
 
+def _circle(done: Simulated) -> Found:
+    from procedures.load_balancing import inputs
+    from procedures.load_balancing.estimates import FACTS_SEEN, LOADS_SEEN
+    from procedures.load_balancing.procedure import ramp_s
+    from procedures.load_balancing.steps import AFTER, BEFORE, of_way, read_around
+    from procedures.servomotor.parameters import chosen, named
+    from sim_backend.motion import CircleAsked
+
+    plan: Any = done.recording.plan
+    rig, of = done.recording.rig, done.drawn.machine.motions.circle
+    if of is None:
+        return
+    around = read_around(done.recording)
+    model = inputs.told(rig, plan, done.recording.calibrations)
+    phase = {"motor.phase_slew": plan.gamma_slew_rad_s, "motor.phase_limit": plan.gamma_max_rad}
+    told = {rig.capabilities.model[key]: value for key, value in model.items()}
+    carried = {**named(rig, {**phase, "motor.share": 1.0}), **chosen(rig, "sharing", "priority")}
+    for way, sign in plan.signs:
+        circled = named(rig, {"motor.circle": plan.radius_m, "motor.circle_hz": sign * plan.circle_hz})
+        asked = CircleAsked(
+            {name: p.default for name, p in rig.parameters.items()} | told, carried, circled,
+            chosen(rig, "load_balancing", "on"), plan.radius_m, sign * plan.circle_hz, ramp_s(plan), plan.engage_rad,
+            plan.gamma_slew_rad_s, plan.gamma_max_rad, [a.branch for a in of_way(around, way, AFTER)],
+        )  # fmt: skip
+        for (name, when), value in of(rig, done.drawn, asked).items():
+            if name == "predicted_reduction":
+                yield from ((name, f"{source}, {way}", value) for source in (LOADS_SEEN, FACTS_SEEN))
+            else:
+                yield name, f"{when}, {way}" if when in (BEFORE, AFTER) else way, value
+
+
 def _angle(done: Simulated) -> Found:
     from procedures.angle_step.procedure import CODES, carried, planned
     from procedures.servomotor.conventions import conventions
@@ -318,5 +349,6 @@ TRUTHS: Mapping[str, Callable[[Any], Found]] = {
     "angle-step": _angle,
     "maximum-speed": _maximum_speed,
     "derivative": _derivative,
+    "load-balancing": _circle,
     "estimator-compare": _compare,
 }

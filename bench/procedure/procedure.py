@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bench.errors import ConfigError, Lacking
+from bench.errors import ConfigError, Lacking, Unfit
 from bench.figures import Shown
 from bench.findings import Ended, Finding, Findings
 from bench.plan import BenchPlan
@@ -145,11 +145,9 @@ class Procedure:
     method: str = ""  # the report's section: plain paragraphs, parted by empty lines
 
     def refuse_by(self, rig: RigFile, plan: Any, calibrations: Iterable[Calibration]) -> None:
-        """Raises ConfigError if the plan cannot work by what is known of the rig; `calibrations` are those that it needs."""
-        if problems := list(self.foresees(rig, plan, {c.procedure: c for c in calibrations})):
-            raise ConfigError(
-                "\n  ".join(["the plan does not fit what is known of the rig; nothing was started:", *problems])
-            )
+        """Raises Unfit if the plan cannot work by what is known of the rig; `calibrations` are those that it needs."""
+        if problems := tuple(self.foresees(rig, plan, {c.procedure: c for c in calibrations})):
+            raise Unfit(problems)
 
     def steps(self, rig: RigFile, plan: Any) -> int:
         """How many steps `acquire` will record on a rig; 0 is unknown."""

@@ -191,12 +191,15 @@ def _agreement(result: Result) -> Finding:
 
 
 def _one_way(result: Result) -> dict[str, float]:
-    """Torque that drives forward whichever way the rotor turns, N m, by sharing."""
+    """Torque that drives forward whichever way the rotor turns, N m, by sharing, less what a lag makes with the encoder's zero:
+    a current `across` the field that is the same in both directions gives alpha_tau sin(M gamma_0t) of torque."""
     out = {}
     for s, x in result.of.items():
         ways = {d: [w for w in x.windows if w.direction == d] for d in (1, -1)}
         speed = {d: float(np.mean([w.speed for w in found])) for d, found in ways.items()}
         current = {d: float(np.mean([d * w.segments.mean() for w in found])) for d, found in ways.items()}
         drag, per_A = result.drag.value, result.per_A.value
-        out[s] = (drag * (speed[1] - speed[-1]) - per_A * (current[1] - current[-1])) / 2
+        across = -x.current * math.tan(x.lag)
+        found = (drag * (speed[1] - speed[-1]) - per_A * (current[1] - current[-1])) / 2
+        out[s] = found - per_A * math.tan(result.turned) * across
     return out

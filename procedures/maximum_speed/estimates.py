@@ -67,6 +67,7 @@ class Result:
     per_A: Estimate  # torque per ampere in the mean over a turn, N m/A
     square_A2: float
     time_constant_s: float  # J/B
+    turned: float  # M gamma_0t, rad: the encoder's zero in the electrical turn
 
 
 def gathered(windows: list[Window], sharing: str, counts: int) -> Shared:
@@ -114,6 +115,7 @@ def evaluate(windows: list[Window], plan: Plan, rig: RigFile, facts: Mapping[str
     return Result(
         of, {name: _with_unit(name, e) for name, e in found.items()} | _ripples(of), **extra,
         square_A2=square(held, pairs, {k: e.value for k, e in inputs.items()}),
+        turned=rig.machine["pole_pairs"].value * facts["torque-constant"].values["gamma_0t"].value,
         time_constant_s=facts["spindown"].values["J_z"].value / extra["drag"].value,
     )  # fmt: skip
 

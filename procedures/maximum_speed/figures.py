@@ -22,8 +22,9 @@ from procedures.servomotor.conventions import conventions
 Array = npt.NDArray[np.float64]
 WORDS: Mapping[str, str] = {HALF: "λ = 1/2", OP: "λ by (6.24)"}
 NAMES: Mapping[str, str] = {HALF: "half", OP: "op"}
-SHOWN = 4  # changes of the sharing
-MEAN_S = 0.05  # of the curves over time
+SHOWN = 4  # changes of the sharing: to a half from rest, by (6.24), the same again, a half
+LEAST_S, CONSTANTS = 1.5, 8.0  # how long each is shown, in s and in J/B
+MEAN_S = 0.02  # of the curves over time
 TICKS = 10  # of the curves within a turn: means over a millisecond
 
 
@@ -35,22 +36,21 @@ def all_figures(result: Result, recording: Recording[Plan], limit_A: float) -> I
 
 
 def _over_time(result: Result, recording: Recording[Plan]) -> Iterator[Figure]:
-    """Speed and torque current of the first runs forward, each sharing in its colour."""
-    changes = [e for e in recording.events(SHARED) if e["direction"] > 0]
-    runs = [s for s in recording.steps(RUN) if int(s.labels["direction"]) > 0]
-    ends = [s.end_ns for s in runs[: min(SHOWN, len(changes))]]
-    if not ends:
+    """Speed and torque current after each of the first changes of the sharing, forward, the first of them from rest."""
+    changes = [e for e in recording.events(SHARED) if e["direction"] > 0][:SHOWN]
+    if len(changes) < SHOWN:
         return
-    begun = changes[0]["t_ns"]
-    parts: dict[str, list[tuple[Array, Array, Array]]] = {HALF: [], OP: []}
-    for event, end in zip(changes, ends, strict=False):
-        parts[event["sharing"]].append(_read(recording, event["t_ns"], end, begun))
+    shown_ns = round(max(LEAST_S, CONSTANTS * result.time_constant_s) * 1e9)
     speeds, currents = [], []
-    for s, of in parts.items():
-        for k, (t, speed, current) in enumerate(of):
-            label = WORDS[s] if k == 0 else f"{WORDS[s]}, again"
-            speeds.append(Series(label, t, RPM * speed))
-            currents.append(Series(label, t, current))
+    for event, label in (
+        (changes[0], "from rest"),
+        (changes[1], f"after {WORDS[HALF]}"),
+        (changes[3], f"after {WORDS[OP]}"),
+    ):
+        t, speed, current = _read(recording, event["t_ns"], event["t_ns"] + shown_ns)
+        name = f"{WORDS[event['sharing']]}, {label}"
+        speeds.append(Series(name, t, RPM * speed))
+        currents.append(Series(name, t, current))
     expected = tuple(
         (f"expected, {WORDS[s]}", RPM * result.estimates[f"predicted_{n}"].value) for s, n in NAMES.items()
     )
@@ -59,12 +59,12 @@ def _over_time(result: Result, recording: Recording[Plan]) -> Iterator[Figure]:
         "torque-current", "Torque current", "", "time (s)", "torque current (A)", tuple(currents), lines=bounds
     )
     yield Figure("speed", "Speed at the torque limit, two ways of sharing the segments",
-                 "As T Fig. 6.8a: forward, from rest, both ways in turn, means over 50 ms. Lines: the speeds that torque "
-                 "constant and drag expect of the recorded currents; below, what the segments' limit leaves for torque.",
+                 "As T Fig. 6.8a: forward, from when the segments are shared so, means over 20 ms. Lines: the speeds "
+                 "that torque constant and drag expect; below, what the segments' limit leaves for torque on average.",
                  "time (s)", "speed (r/min)", tuple(speeds), lines=expected, below=below)  # fmt: skip
 
 
-def _read(recording: Recording[Plan], start: int, end: int, zero: int) -> tuple[Array, Array, Array]:
+def _read(recording: Recording[Plan], start: int, end: int) -> tuple[Array, Array, Array]:
     segments = conventions(recording.rig).segments
     data = recording.read((SPEED, *segments), start, end)
     n = max(1, round(MEAN_S * 1e9 / max(float(np.median(np.diff(data["t_ns"]))), 1.0)))
@@ -75,7 +75,7 @@ def _read(recording: Recording[Plan], start: int, end: int, zero: int) -> tuple[
         return out
 
     torque = np.mean([data[c] for c in segments], axis=0)
-    return means((data["t_ns"] - zero) * 1e-9), means(data[SPEED]), means(torque)
+    return means((data["t_ns"] - start) * 1e-9), means(data[SPEED]), means(torque)
 
 
 def _balance(result: Result) -> Figure:
@@ -90,11 +90,11 @@ def _balance(result: Result) -> Figure:
         torques = np.array([result.per_A.value * run.direction * run.segments.mean() for run in x.windows])
         series.append(Series(WORDS[s], RPM * speeds, torques, "points"))
         u = drag * interval(found).U
-        series.append(Series(f"{WORDS[s]}, mean of both directions with U of the balance", np.array([RPM * x.speed]),
+        series.append(Series(f"{WORDS[s]}, mean and U", np.array([RPM * x.speed]),
                              np.array([result.per_A.value * x.current]), "points", np.array([u])))  # fmt: skip
     return Figure("balance", "Torque over speed",
                   "α_τ cos(M γ_0t) times the mean current of the segments. What drives the rotor one way, such as unequal "
-                  "segments that carry the shaft, parts the directions and drops out of their mean.",
+                  "segments that carry the shaft, parts the directions and drops out of their mean. Bars: U of the balance.",
                   "speed (r/min)", "torque (N m)", tuple(series))  # fmt: skip
 
 

@@ -106,9 +106,10 @@ class Expected:
     speed: dict[str, float]
 
 
-def expected(limit: float, carrying: float, per_A: float, drag: float, constant: float) -> Expected:
-    """`per_A`: torque per ampere N m/A; `drag` N m s/rad; `constant` torque N m. Nothing sideways: what runout and noise take
-    makes both runs slower."""
-    i_y = np.array([carrying])
-    torque = {s: float(bound(limit, np.zeros(1), i_y, s)[0]) for s in SHARINGS}
+def expected(
+    limit: float, carrying: float, per_A: float, drag: float, constant: float, sideways: float = 0.0
+) -> Expected:
+    """`per_A`: torque per ampere N m/A; `drag` N m s/rad; `constant` torque N m; `sideways` the size of i_x, A."""
+    i_x, i_y = np.array([sideways]), np.array([carrying])
+    torque = {s: float(bound(limit, i_x, i_y, s)[0]) for s in SHARINGS}
     return Expected(carrying, torque, {s: (per_A * i - constant) / drag for s, i in torque.items()})

@@ -15,6 +15,7 @@ from procedures.servomotor import carrying
 from procedures.servomotor.parameters import stated
 from procedures.spindown.estimates import drive_drag
 
+SIDEWAYS_A = 0.2  # of i_x, by runout and noise alone
 RESERVE_A = 0.5  # of force current beside what carries: the law answers noise and runout by 0.3 A rms
 NEAR = 0.97  # of the guard: nearer, and it takes torque away
 SLOWEST_RAD_S = 5.0
@@ -47,7 +48,7 @@ def expected_of(rig: RigFile, plan: Plan, facts: Mapping[str, Calibration]) -> E
     per_A = torque["alpha_tau"].value * math.cos(rig.machine["pole_pairs"].value * torque["gamma_0t"].value)
     constant = drag.values["T_c"].value + drive_drag(rig).value
     at = b + (b_high - b) * (plan.bias_A**2 - low) / (high - low)
-    return expected(limit_of(rig, plan), carrying_A(rig, plan), per_A, at, constant)
+    return expected(limit_of(rig, plan), carrying_A(rig, plan), per_A, at, constant, SIDEWAYS_A)
 
 
 def speeds(rig: RigFile, plan: Plan, facts: Mapping[str, Calibration]) -> Iterator[str]:

@@ -32,30 +32,46 @@ from procedures.servomotor.parameters import BIASES, chosen, named, needed, stat
 from procedures.shared import assumptions
 
 SPEED_HALF = Quantity(
-    "speed_half", "rad/s", "steady speed at the torque limit with lambda 1/2, mean of both directions"
+    "speed_half",
+    "rad/s",
+    "steady speed at the torque limit with λ = 1/2, mean of both directions",
+    title="maximum speed, λ = 1/2",
 )
 SPEED_OP = Quantity(
-    "speed_op", "rad/s", "steady speed at the torque limit with lambda by T (6.24), mean of both directions"
+    "speed_op",
+    "rad/s",
+    "steady speed at the torque limit with λ by T (6.24), mean of both directions",
+    title="maximum speed, λ by (6.24)",
 )
-RATIO = Quantity("ratio", "1", "speed with lambda by T (6.24) over that with lambda 1/2")
+RATIO = Quantity("ratio", "1", "speed with λ by T (6.24) over that with λ = 1/2", title="ratio of the speeds")
 RATIO_PREDICTED = Quantity(
-    "ratio_predicted", "1", "ratio of the mean torque currents that the limit leaves beside the recorded |i_x|, |i_y|"
+    "ratio_predicted",
+    "1",
+    "ratio of the mean torque currents that the limit leaves beside the recorded |i_x|, |i_y|",
+    title="ratio of the torque currents",
 )
 PREDICTED_HALF = Quantity(
-    "predicted_half", "rad/s", "speed with lambda 1/2 by torque constant, drag and torque current"
+    "predicted_half",
+    "rad/s",
+    "speed with λ = 1/2 by torque constant, drag and torque current",
+    title="expected, λ = 1/2",
 )
-PREDICTED_OP = Quantity("predicted_op", "rad/s", "speed with lambda by T (6.24) by the same")
-SLOPE = Quantity("torque_slope", "N m s/rad", "torque over speed from one sharing to the other")
-SD = Quantity("speed_sd", "rad/s", "rms of the speed about its mean within a turn, orders 1 to 4")
+PREDICTED_OP = Quantity("predicted_op", "rad/s", "speed with λ by T (6.24) by the same", title="expected, λ by (6.24)")
+SLOPE = Quantity(
+    "torque_slope", "N m s/rad", "torque over speed from one sharing to the other", title="torque over speed"
+)
+SD = Quantity(
+    "speed_sd", "rad/s", "rms of the speed about its mean within a turn, orders 1 to 4", title="ripple of the speed"
+)
 SINGLES = (SPEED_HALF, SPEED_OP, RATIO, RATIO_PREDICTED, PREDICTED_HALF, PREDICTED_OP, SLOPE)
 MEASURES = (*SINGLES, SD)
 NEEDED = ("motor.share", "motor.share_slew", "motor.segment_limit", "motor.ramp", "motor.ref_along", "angle.speed")
-WORDS = {"half": "lambda 1/2", "op": "lambda by (6.24)"}
+WORDS = {"half": "λ = 1/2", "op": "λ by (6.24)"}
 
 
 def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
     """Lifted with the angle released: no loop is closed before the encoder's direction is known."""
-    return named(rig, {**dict.fromkeys(BIASES, plan.bias_A), **hold.RELEASED})
+    return {**named(rig, {**dict.fromkeys(BIASES, plan.bias_A), **hold.RELEASED}), **hold.speed_held(rig)}
 
 
 def needs(plan: Plan) -> tuple[Need, ...]:
@@ -174,6 +190,7 @@ procedure = Procedure(
     step_count=step_count,
     needs=needs,
     places=tuple(WORDS.values()),
+    reached=("encoder/*",),  # read from the recording itself
     assumes=assumptions.MAXIMUM_SPEED,
     method=read_method(__file__),
 )

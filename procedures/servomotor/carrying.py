@@ -21,8 +21,8 @@ MARGIN = (
 
 def lacking(rig: RigFile) -> tuple[str, ...]:
     """What a controller lacks to let the motor carry the outboard end, force first."""
-    bound = (key for key in ("motor.share", "motor.share_slew", "settings.sharing") if not can(rig.capabilities, key))
-    return tuple(bound)
+    needed = ("motor.share", "motor.share_slew", "settings.sharing.priority")
+    return tuple(key for key in needed if not can(rig.capabilities, key))
 
 
 def home(rig: Rig) -> None:

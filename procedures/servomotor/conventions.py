@@ -101,6 +101,8 @@ class Servomotor:
 
 
 ROLES = ("yi", "yo", "xi", "xo")
+PHASE, LOADS = "gamma", ("load_x", "load_y")
+"""What a capture of the controller calls the motor's phase angle, and the load on it as its observer has it, across and up."""
 
 
 @once_per_rig

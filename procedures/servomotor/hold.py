@@ -8,12 +8,20 @@ from __future__ import annotations
 
 from bench.procedure.rig import Rig
 from bench.recording.recorder import Recorder
+from bench.rigfile import RigFile
 from procedures.servomotor.parameters import stated, write
 
 GAINS = ("angle.kp", "angle.kd", "angle.ki")
 NEEDED = (*GAINS, "angle.ref")
 RELEASED = dict.fromkeys(GAINS, 0.0)
 PROBE_RAD, PROBE_GAIN, PROBE_S = 0.2, 5.0, 0.3  # one ampere at first, a tenth of the amplifiers
+
+
+def speed_held(rig: RigFile) -> dict[str, float]:
+    """What makes the controller hold the speed that it is asked for, in place of giving all its torque until then: who turns
+    the rotor by it writes this first, for a run that was ended at the torque limit may have left the other."""
+    known = rig.capabilities.settings.get("torque", {})
+    return dict(known.get("held", {}))
 
 
 def release(rig: Rig) -> None:

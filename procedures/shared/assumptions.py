@@ -117,3 +117,6 @@ BALANCE = (
     "are weighed on it are right all the same.",
     "Runout that changes with speed reads as unbalance: 2 µm at 10 000 r/min as some 1 g mm, as found and as left.",
 )
+LOAD_BALANCING = (
+    "Segment current sensors whose readings bend: 0.1 % of 10 A at 7 A and nothing at 5 A changes the reduction by 0.1 points.",
+)

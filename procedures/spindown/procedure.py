@@ -78,6 +78,8 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     if plan.motor_carries and not _carries(rig, plan, record):
         return
     by = "drive" if plan.run_up == "drive" or (plan.run_up == "auto" and rig.drive is not None) else "motor"
+    if by == "motor":
+        rig.levitation.write(hold.speed_held(rig.file))
     for group, bias in groups(plan):
         if group != "low":
             _at_rest(rig, plan, bias, "ring" if group == "ring" else "")

@@ -245,7 +245,7 @@ def test_a_rig_without_a_drive_is_run_up_by_its_motor_and_lacks_nothing(tmp_path
 def test_what_is_adopted_holds_for_its_biases(sound: Simulated) -> None:
     calibration = sound.calibration()
     assert {"B", "B_high", "T_c", "J_z"} <= set(calibration.values)
-    assert calibration.settings == {"bias_A": 3.0, "bias_high_A": 4.0}
+    assert calibration.settings == {"bias_A": 3.0, "bias_high_A": 4.0, "motor_carries": 0.0}
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from bench.cli.campaign.tasks import RigTask, StepTask
 from bench.cli.compose import Request
 from bench.cli.motion_truth import truth_of_motion
 from bench.cli.virtual import flown
-from bench.errors import BenchError, RecordingError
+from bench.errors import BenchError, RecordingError, Unfit
 from bench.findings import Finding
 from bench.procedure import Measured
 
@@ -46,7 +46,10 @@ def simulated_step(
     Raises:
         AnalysisError: the data do not allow the numbers.
     """
-    done = flown(step.procedure, task.rig, seed, step.plan, path, task.truth, known, visit=task.visit)
+    try:
+        done = flown(step.procedure, task.rig, seed, step.plan, path, task.truth, known, visit=task.visit)
+    except Unfit as error:  # a drawn machine that the campaign's plan is none for, as its own facts say
+        return StepResult({}, [], cannot=error.why[0])
     cause = done.machine.cause
     if cause is not None and not isinstance(cause, BenchError):
         raise cause

@@ -63,6 +63,7 @@ void tsbs_carry(const tsbs_control *c, double keep, tsbs_law_state *l, const dou
     const double *o = l->observed;
     double direct = c->model_alpha_d * l->field_c, cross = c->model_alpha_c * l->field_s;
     double f[2], square = direct * direct + cross * cross;
+    if (c->balance == OTHER_SIGN) cross = -cross;
     for (int a = 0; a < 2; a++) {
         f[a] = c->model_mass * (c->kp_b * (set[a] - y[a]) - c->kd_b * o[3 * a + 1]) - c->model_stiffness * y[a] - o[3 * a + 2];
         l->motor_integral[a] = f[a] / c->model_alpha_d; /* the PID takes over without a jump */
@@ -95,6 +96,7 @@ void tsbs_balance(const tsbs_control *c, tsbs_law_state *l) {
         if (l->balancing == 0) l->line = f[2] != 0 ? atan(f[5] / f[2]) : PI / 2; /* nothing observed yet: weight pulls down */
         l->balancing = 1;
         l->line += remainder(atan2(l->load[1], l->load[0]) - l->line, PI);
+        if (c->balance == WRAPPED) l->line = l->load[0] != 0 ? atan(l->load[1] / l->load[0]) : PI / 2;
         double past = fabs(l->line) - PI / 4, turn = l->line < 0 ? -past : past;
         to = atan2(c->model_alpha_d * sin(turn), c->model_alpha_c * cos(turn)) / c->pole_pairs;
         to = clip(to, -c->gamma_max, c->gamma_max);

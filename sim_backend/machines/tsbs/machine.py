@@ -32,13 +32,16 @@ DEFECTS = {
     "mass_error_M4": 0.0, "hanger_off_at_zero": 0.0, "drop_fraction": 0.0, "integrator_factor": 1.0, "dead_after_s": 0.0,
     "fault_after_s": 0.0, "drive_fault_after_s": 0.0, "exchange_segments": 0.0, "segment_sign_1": 1.0,
     "encoder_sign": 1.0, "lever_slip": 0.0, "segment_scale_drift": 0.0, "drive_brakes": 0.0, "factor_gamma": 1.0,
+    "factor_balance": 1.0, "factor_gamma_max": 1.0, "factor_model_alpha_d": 1.0,
+    "factor_model_alpha_c": 1.0, "factor_model_stiffness": 1.0, "factor_circle_radius": 1.0,
     "factor_kp_theta": 1.0, "factor_kd_theta": 1.0, "factor_sine_amplitude": 1.0, "factor_angle_ref": 1.0,
     "factor_gamma_slew": 1.0, "ring_friction": 0.1, "contact_silent": 0.0, "weight_left_kg": 0.0,
     "factor_lag_compensation": 1.0, "factor_segment_max": 1.0, "kept_allocation": 0.0,
 }  # fmt: skip
 """Planted defects and their harmless values. Mass errors are relative; `factor_...` is what the controller makes of a
 parameter, over what it was told; `kept_...` is what it keeps to instead; `segment_scale_drift` is relative, 1/s, of all four
-segments' sensors."""
+segments' sensors.
+Of `factor_balance` 2 wraps the load's line, 3 turns phi's sign round, 4 has an observer of currents without limits."""
 
 CONTACT = 4 | 8  # of the flags, inboard and outboard
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from sim_backend.machine import Truth
+from sim_backend.machines.tsbs.balancing import circle
 from sim_backend.machines.tsbs.quantities import drag_of
 from sim_backend.machines.tsbs.truth_speed import speeds
 from sim_backend.motion import DragAsked, Motions
@@ -21,4 +22,4 @@ def drag(drawn: Truth, asked: DragAsked) -> Mapping[str, float]:
     return {"B": low, "B_high": high, "T_c": p.coulomb, "J_z": p.polar_inertia}
 
 
-MOTIONS = Motions(drag=drag, speeds=speeds)
+MOTIONS = Motions(circle=circle, drag=drag, speeds=speeds)

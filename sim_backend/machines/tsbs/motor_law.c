@@ -133,6 +133,11 @@ void tsbs_rotate(const tsbs_control *c, const tsbs_gains *g, tsbs_law_state *l, 
     if (c->phases == 6) own_frame(c, current, &asked);
     tsbs_allocate(c, l, l->i_x + current[0], l->i_y + current[1], asked, out);
     if (l->share > 0) act(c, l, out);
+    if (c->balance == UNLIMITED) { /* planted */
+        double direct = c->model_alpha_d * l->field_c, cross = c->model_alpha_c * l->field_s;
+        l->acted[0] = direct * current[0] - cross * current[1];
+        l->acted[1] = direct * current[1] + cross * current[0];
+    }
     out->gamma = l->gamma;
     out->ahead = c->lag_compensation != 0 ? l->angle_filtered * c->segment_lag : 0;
 }

@@ -5,6 +5,10 @@
 #include "numbers.h"
 #include "tsbs.h"
 
+/* balance: 1 is sound; more are planted defects (docs/reference/load-balancing.md): the load's line wrapped into two quadrants, phi
+ * with the wrong sign, an observer that takes what was asked for the currents that there are */
+enum { BALANCED = 1, WRAPPED = 2, OTHER_SIGN = 3, UNLIMITED = 4 };
+
 /* share of a first-order filter's memory that survives a tick (backward Euler) */
 #define KEEP(hz) (1 / (1 + TWO_PI * (hz) * TICK))
 
