@@ -21,9 +21,10 @@ from procedures.shared.gradients import by_inputs
 from procedures.shared.step_table import StepTable
 
 Array = npt.NDArray[np.float64]
-EARLY_N, EARLY_HALF_N = 0.05, 0.02
-"""An end goes by so much force early, within so much more: the loop that holds x answers the noise of its probe, a push of a
-few milliseconds is enough where the ring hardly carries, and the ramp goes on meanwhile."""
+EARLY_N, EARLY_HALF_N = (0.033, 0.27), (0.015, 0.15)
+"""An end goes by so much force early, within so much more, the second number times sin^2 of how far the force is turned: the
+loop that holds x answers the noise of its probe, which lifts by that sine; a push of a few milliseconds is enough where the ring
+hardly carries; and the ramp goes on meanwhile."""
 ASIDE_N = 0.015  # by how much that differs between the signs of gamma
 RIPPLE = 0.025  # of the force constants (T 5.25), over the rotor's angle
 COUNT_RAD = math.pi / 4096 / 2  # where the rotor stands within its encoder's count: half of what it may be off
@@ -69,8 +70,9 @@ def evaluate(recording: Recording[Plan], rest: StepTable[Rest]) -> Analysis:
     if len(gammas):
         values = {name: e.value for name, e in inputs.items()}
         turned = float(gammas[:, 1].mean() - gammas[:, 0].mean()) / 2 + values["gamma_0"]
+        force = math.sin(values["pole_pairs"] * (turned - values["gamma_0"])) ** 2
         ripple = [fit.ripple(values, limit, turned, off, RIPPLE) for off in _off(ramps, lifted)]
-        found |= _angles(gammas, slope, (ripple[0], ripple[1]), plan)
+        found |= _angles(gammas, slope, force, (ripple[0], ripple[1]), plan)
     return Analysis(rest, dwells, held, ramps, lifted, gammas, found, limit)
 
 
@@ -120,10 +122,14 @@ def _off(ramps: Sequence[Ramped], lifted: Sequence[int | None]) -> tuple[float, 
     return abs(above - below) / 2 + COUNT_RAD, abs(above + below) / 2 + COUNT_RAD
 
 
-def _angles(gammas: Array, slope: float, ripple_N: tuple[float, float], plan: Plan) -> dict[str, Estimate]:
-    """Half difference and mean of both angles, each from what the repeats gave; `slope` N/rad, `ripple_N` in each."""
+def _angles(
+    gammas: Array, slope: float, square: float, ripple_N: tuple[float, float], plan: Plan
+) -> dict[str, Estimate]:  # fmt: skip
+    """Half difference and mean of both angles, each from what the repeats gave; `slope` N/rad, `square` sin^2 of how far the
+    force is turned, `ripple_N` in each."""
     out = {}
-    early = Estimate.of(EARLY_N, _bound("lift/early", "motion at the threshold", EARLY_HALF_N, "N"))
+    at, half = (one[0] + one[1] * square for one in (EARLY_N, EARLY_HALF_N))
+    early = Estimate.of(at, _bound("lift/early", "motion at the threshold", half, "N"))
     early = early + Estimate.of(0.0, _product("lift/ripple", ripple_N[0]))
     aside = Estimate.of(0.0, _bound("lift/aside", "motion at the threshold, one way", ASIDE_N, "N"))
     aside = aside + Estimate.of(0.0, _product("lift/ripple-aside", ripple_N[1]))
