@@ -115,14 +115,20 @@ class AngleCase:
 
 @dataclass(frozen=True)
 class AngleAsked:
-    """Steps of the angle while the motor carries: `settings` as those of steps, what it `carries` by, the parameter of the
-    `reference`, the limit of a segment, A, cases by how they are named, and the times before, between and after, s."""
+    """Steps of the angle while the motor carries: `settings` as those of steps, by which the shaft is lifted with its angle
+    released; by what it is `turned` a little and then `holds` its angle, the `gains` of the steps, what the motor `carries` by,
+    the parameter of the `reference`, the limit of a segment, A, cases by how they are named, how often each way, and the times
+    before, between and after, s."""
 
     settings: Numbers
+    turned: Numbers
+    holds: Numbers
+    gains: Numbers
     carries: Numbers
     reference: str
     limit: float
     cases: Mapping[str, AngleCase]
+    repeats: int
     settle_s: float
     standstill_s: float
     record_s: float

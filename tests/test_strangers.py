@@ -3,10 +3,12 @@ of probes of which one falls, directions from a drain plug and a heartbeat of on
 degrees apart of which one has a coordinate's name, one axial coil, seven messages in both byte orders, no state for landing;
 `slant` at 30 degrees, whose set points are the shaft's, whose status bits are signals, and whose controller tells no bias.
 
-Of six more only what is new: `threeplanes` of six probes with masses; `incline`, overhung and 20 degrees up; `gemischt`, whose
-second bearing is turned by 45 degrees, on classic CAN with German states in cp1252 and a probe that counts backwards; `lento`,
-which sends every 5 ms in mil and has nobody to push; `skewed`, standing, axes 60 degrees apart, clockwise; `solo`, one bearing
-of four axes, which no procedure takes."""
+Of seven more only what is new: `threeplanes` of six probes with masses; `incline`, overhung and 20 degrees up; `gemischt`,
+whose second bearing is turned by 45 degrees, on classic CAN with German states in cp1252 and a probe that counts backwards;
+`lento`, which sends every 5 ms in mil and has nobody to push; `skewed`, standing, axes 60 degrees apart, clockwise; `suspendu`,
+which hangs with its centre of mass below both bearings, in three planes of probes of which one looks 45 degrees past its axes,
+with single readings every 4 ms, ticks of 16 bits and French states in latin-1; `solo`, one bearing of four axes, which no
+procedure takes."""
 
 from __future__ import annotations
 
@@ -30,7 +32,7 @@ from procedures.amb_rotor.conventions import conventions
 SHORT = {"slow_s": 6.0, "dwell_s": 1.5, "settle_s": 1.0}
 FOLDER = Path(__file__).resolve().parent / "strangers"
 OVERHUNG, HANGING, SLANT = (str(FOLDER / f"{name}.toml") for name in ("overhung", "hanging", "slant"))
-NEW = ("threeplanes", "incline", "gemischt", "lento", "skewed")
+NEW = ("threeplanes", "incline", "gemischt", "lento", "skewed", "suspendu")
 ALL = pytest.mark.parametrize("path", [OVERHUNG, HANGING, SLANT], ids=["overhung", "hanging", "slant"])
 
 

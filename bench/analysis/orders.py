@@ -23,7 +23,8 @@ from bench.errors import AnalysisError
 
 BATCHES = 16
 IN_TURN = 2.5  # samples, on the average: a turn is told up to 0.4 of their rate
-IN_BATCH = 10  # samples of a batch in whose turns there are fewer than four each
+IN_SHORT = 4  # samples of a turn, on the average, in a batch of fewer than IN_BATCH
+IN_BATCH = 10
 
 
 @dataclass(frozen=True)
@@ -139,7 +140,7 @@ def _cuts(angle: Array, turns: int | None, batches: int) -> tuple[npt.NDArray[np
     low, high = valid[0], valid[-1] + 1
     cuts = low + np.searchsorted(angle[low:high], TURN * (edges[:-1, None] + inner))
     samples, turned = np.diff(cuts, axis=1), np.diff(inner)
-    if (samples < np.maximum(IN_TURN * turned, np.minimum(4 * turned, IN_BATCH))).any():
+    if (samples < np.maximum(IN_TURN * turned, np.minimum(IN_SHORT * turned, IN_BATCH))).any():
         found = f"fewer than {IN_TURN:g} samples in a turn, or too few turns"
         raise AnalysisError(f"synchronous vectors: {found}; record faster, or longer")
     return cuts, m

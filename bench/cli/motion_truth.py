@@ -278,6 +278,7 @@ def _circle(done: Simulated) -> Found:
 
 def _angle(done: Simulated) -> Found:
     from procedures.angle_step.procedure import CODES, carried, planned
+    from procedures.servomotor import hold, wiring
     from procedures.servomotor.conventions import conventions
     from procedures.servomotor.parameters import named, parameter, stated
     from sim_backend.motion import AngleAsked, AngleCase
@@ -295,8 +296,10 @@ def _angle(done: Simulated) -> Found:
         for case in planned(plan)
     }  # fmt: skip
     asked = AngleAsked(
-        _settings(done, named(rig, carried(rig, plan))), named(rig, {"motor.share": 1.0}), parameter(rig, "angle.ref"),
-        stated(rig, "motor.segment_limit").default, cases, plan.settle_s, plan.standstill_s, plan.record_s,
+        _settings(done), named(rig, {"angle.ref": wiring.TURN_RAD, "angle.kp": hold.PROBE_GAIN}),
+        named(rig, {"angle.ref": 0.0} | {key: stated(rig, key).default for key in hold.GAINS}), named(rig, carried(rig, plan)),
+        named(rig, {"motor.share": 1.0}), parameter(rig, "angle.ref"),
+        stated(rig, "motor.segment_limit").default, cases, plan.repeats, plan.settle_s, plan.standstill_s, plan.record_s,
     )  # fmt: skip
     outboard, motor = conventions(rig).bearings[1], next(iter(rig.motors), "motor")
     places = {"peak_outboard": outboard, "peak_motor": motor}

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from bench.clock import Clock
-from bench.link.health import Health
-from bench.link.telemetry import Counters
 from bench.procedure.roles import Capture, Drive, Levitation, Operator, Rotation, Supply, Thermal
 from bench.rigfile import RigFile
+
+if TYPE_CHECKING:  # every procedure imports this module, and a listing of them needs no link
+    from bench.link.health import Health
+    from bench.link.telemetry import Counters
 
 
 @dataclass

@@ -13,6 +13,7 @@ with identities, so that what is made of them is uncertain by each once.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -53,8 +54,8 @@ class Placed:
 
 @dataclass(frozen=True)
 class Ring:
-    """A touchdown ring: `arm` from the centre of mass, m; None: where the probes of its bearing stand, 0 the near one, 1 the
-    far one (`plane`). `clearance` m."""
+    """A touchdown ring: `arm` from the centre of mass, m; None: where two of the four probes stand, those of its bearing, 0 the
+    near one, 1 the far one (`plane`). `clearance` m."""
 
     name: str
     plane: int
@@ -193,11 +194,12 @@ def _stations(rig: RigFile, places: Places, planes: tuple[Support, Support]) -> 
     looking = {probe.channel: Placed(places.distance(CENTRE, f"probes/{name}"), turned(f"probes/{name}"), probe.sign)
                for name, probe in rig.probes.items() if probe.direction is not None}  # fmt: skip
     own = [a.position for p in planes for a in p.axes if a.position]
+    stand = Counter(p.arm.value for p in looking.values())
     tilted = rig.shaft is not None and rig.shaft.tilt is not None
     return Stations(
         axes,
         {name: looking[name] for name in dict.fromkeys((*own, *looking))},
-        tuple(_rings(rig, places, planes)),
+        tuple(_rings(rig, places, planes, paired=list(stand.values()) == [2, 2])),
         y,
         hand,
         1 if rig.shaft is None else rig.shaft.sense,
@@ -218,7 +220,8 @@ def upward(first: float, hand: int, tilt: float) -> tuple[float, float]:
     return lies * math.cos(first), lies * -hand * math.sin(first)
 
 
-def _rings(rig: RigFile, places: Places, planes: tuple[Support, Support]) -> list[Ring]:
+def _rings(rig: RigFile, places: Places, planes: tuple[Support, Support], *, paired: bool) -> list[Ring]:
+    """One whose place nobody states is at its bearing: where two of four probes stand (`paired`), else where the bearing is."""
     names = [p.name for p in planes]
     out = []
     for name, ring in rig.rings.items():
@@ -227,6 +230,8 @@ def _rings(rig: RigFile, places: Places, planes: tuple[Support, Support]) -> lis
         arm = places.distance(CENTRE, f"rings/{name}") if ring.at is not None else None
         if arm is None and name not in names:
             raise PlaceError(f"rings.{name}.at", "nothing", "its place, or the name of the bearing that it belongs to")
+        if arm is None and not paired:
+            arm = places.distance(CENTRE, f"bearings/{name}")
         nearest = names.index(name) if name in names else _nearest(arm, places, names)
         out.append(Ring(name, nearest, arm, places.number(ring.clearance, f"rings.{name}.clearance")))
     return out

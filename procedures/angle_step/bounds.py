@@ -21,13 +21,15 @@ import numpy.typing as npt
 from bench.errors import AnalysisError
 from bench.recording import Recording
 from bench.rigfile import RigFile
+from bench.rigfile.roles import ANGLE, resolved
 from bench.uncertainty import Estimate, Influence
-from procedures.servomotor.conventions import Servomotor, conventions
+from procedures.servomotor.conventions import Servomotor, conventions, displacement
 from procedures.servomotor.parameters import stated
 from procedures.shared.certificates import certified_sensors
 
 Array = npt.NDArray[np.float64]
 ASKED = ("across", "along", "torque")
+POSITIONS = ("xi", "yi", "xo", "yo")
 CAPTURED_S = 0.4
 ROUNDING_A = 10 * 2**-23  # of what the law tells, single precision
 
@@ -35,12 +37,17 @@ ROUNDING_A = 10 * 2**-23  # of what the law tells, single precision
 @dataclass(frozen=True)
 class Swing:
     """A captured step: `t` (n,) s, `asked` i_x, i_y, i_theta of the law, each (n,) A, `vectors` (k, 2, n) A: q and d of each
-    segment as their sensors read; `limit` I_s, A."""
+    segment as their sensors read; `limit` I_s, A; `angle` (n,) rad as the encoder tells it; `orbit` and `motor` (2, n) m off
+    the sensors' zero, at the outboard sensor and at the motor; `spread`: the latter's noise over that of one sensor."""
 
     t: Array
     asked: Mapping[str, Array]
     vectors: Array
     limit: float
+    angle: Array
+    orbit: Array
+    motor: Array
+    spread: float
 
     @property
     def bound(self) -> Array:
@@ -64,7 +71,8 @@ def bound(i_x: Array, i_y: Array, limit: float) -> Array:
 def captured(rig: RigFile) -> tuple[str, ...]:
     """What is captured of a step: nothing where currents are amplitudes, or what the law asks for is not recorded."""
     machine = conventions(rig)
-    names = (*machine.segments, *(machine.asked[key] for key in ASKED if key in machine.asked))
+    asked = (machine.asked[key] for key in ASKED if key in machine.asked)
+    names = (*machine.segments, *asked, *machine.positions_of(*POSITIONS), *resolved(rig, [ANGLE]))
     whole = machine.components == 2 and all(key in machine.asked for key in ASKED)
     known = () if rig.capture is None else tuple(rig.capture.channels)
     return names if whole and set(names) <= set(known) else ()
@@ -82,12 +90,18 @@ def read_swing(recording: Recording[Any], number: object) -> Swing | None:
     found = recording.captures(number=number)
     if not found:
         raise AnalysisError(f"move {number}: found no capture (was the run stopped early?)")
-    machine, data = conventions(recording.rig), found[0].arrays(*names)
+    machine, data, rig = conventions(recording.rig), found[0].arrays(*names), recording.rig
+    inboard, outboard = (np.array([data[c] for c in machine.positions_of(f"x{b}", f"y{b}")]) for b in "io")
+    share = machine.sensor_share(rig.geometry["com_to_motor"].value, rig)
     return Swing(
         np.arange(len(data[names[0]])) / found[0].rate_hz,
         {key: data[machine.asked[key]] for key in ASKED},
         np.array([[data[c] for c in pair] for pair in machine.vectors]),
-        stated(recording.rig, "motor.segment_limit").default,
+        stated(rig, "motor.segment_limit").default,
+        np.unwrap(data[resolved(rig, [ANGLE])[0]]),
+        outboard,
+        displacement(inboard, outboard, share),
+        math.hypot(share, 1 - share),
     )
 
 
@@ -118,7 +132,7 @@ def estimates(where: str, swings: Sequence[Swing], rig: RigFile, bounded: bool) 
     sensors = certified_sensors(rig, {name: name for name in machine.segments})
     gains, offsets = (np.array([[sensors[f"{key}_{c}"].value for c in pair] for pair in machine.vectors])
                       for key in ("gain", "offset"))  # fmt: skip
-    found = [largest(s, offsets, gains, _noise(rig, machine, 1 / float(s.t[1]))) for s in swings]
+    found = [largest(s, offsets, gains, noise_of(rig, machine.segments, 1 / float(s.t[1]))) for s in swings]
     floor = float(np.mean([f.floor for f in found]))
     out = {"amplitude": _scattered(f"amplitude/{where}", [f.amplitude for f in found]) - floor / 2
            + _within(f"noise/amplitude/{where}", "noise in the greatest amplitude", floor / 2)}  # fmt: skip
@@ -142,10 +156,10 @@ def _sensed(found: Sequence[Largest], machine: Servomotor, sensors: Mapping[str,
     return Estimate(out.value, "A", out.sensitivities)
 
 
-def _noise(rig: RigFile, machine: Servomotor, rate_hz: float) -> float:
-    """Of one reading of a segment's current, A: the rig file has that of a sample of the telemetry, a mean of as many."""
+def noise_of(rig: RigFile, channels: Sequence[str], rate_hz: float) -> float:
+    """The largest of single readings of channels: the rig file has that of a sample of the telemetry, a mean of as many."""
     period = rig.messages[rig.binding.telemetry[0]].period_s or 1 / rate_hz
-    stated = [rig.channels[c].noise or 0.0 for c in machine.segments]
+    stated = [rig.channels[c].noise or 0.0 for c in channels]
     return max(stated) * math.sqrt(max(period * rate_hz, 1.0))
 
 

@@ -5,16 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
 from procedures.angle_step import bounds, steps
+from procedures.angle_step.fine import BETWEEN, Fine, fine
 from procedures.angle_step.response import Response, response
 from procedures.angle_step.steps import Case, Done
 from procedures.servomotor.conventions import conventions
 from procedures.shared.certificates import certified_gain
+
+Moved = TypeVar("Moved", Response, Fine)
 
 
 @dataclass(frozen=True)
@@ -42,10 +46,23 @@ def by_case(moves: list[Done], rig: RigFile, band: float, count_rad: float) -> d
         within = max(band * case.size, 2 * count_rad)
         responses = tuple(response(d.move, within) for d in done)
         found = _estimates(case, responses, gains, share, count_rad, period)
-        if swings := [d.swing for d in done if d.swing is not None]:
-            found |= bounds.estimates(case.where, swings, rig, case.allocation == "priority")
+        if all(d.swing is not None for d in done):
+            found |= _captured(case, done, responses, rig, within, count_rad)
         out[case] = Result(case, responses, found)
     return out
+
+
+def _captured(
+    case: Case, done: Sequence[Done], responses: Sequence[Response], rig: RigFile, band_rad: float, count: float
+) -> dict[str, Estimate]:
+    """What captures add, and what they say better where each step is over within its own."""
+    machine, swings = conventions(rig), [d.swing for d in done if d.swing is not None]
+    tick = float(swings[0].t[1])
+    out = bounds.estimates(case.where, swings, rig, case.allocation == "priority")
+    noise = bounds.noise_of(rig, tuple(machine.positions.values()), 1 / tick)
+    shown = [fine(d, s, band_rad, count, noise) for d, s in zip(done, swings, strict=True)]
+    whole = [f for f in shown if f is not None]
+    return out | (_finer(case, whole, responses, rig, count, tick) if len(whole) == len(done) else {})
 
 
 def _period(moves: list[Done]) -> float:
@@ -83,12 +100,57 @@ def _estimates(
     return out
 
 
+def _finer(
+    case: Case, r: Sequence[Fine], still: Sequence[Response], rig: RigFile, count: float, tick: float
+) -> dict[str, Estimate]:
+    """With the influences that captures have."""
+    where, machine, ways = case.where, conventions(rig), [x.forward for x in r]
+    share = machine.sensor_share(rig.geometry["com_to_motor"].value, rig)
+    gains = {axis: certified_gain(rig, channel) for axis, channel in machine.positions.items()}
+
+    def mean(name: str, unit: str, of: Callable[[Fine], float]) -> Estimate:
+        return _each_way(f"{name}/{where}", unit, [of(x) for x in r], ways)
+
+    slope = 1 / math.sqrt(np.mean([1 / x.slopes[0] ** 2 + 1 / x.slopes[1] ** 2 for x in r]))
+    between = _bound(f"edges/{where}", "encoder between its counts", BETWEEN * count, "rad")
+    sampling = _bound(f"ticks/{where}", "sampling", tick / 2, "s")
+    band = _bound(f"edges/settling/{where}", "encoder between its counts", max(x.settling_off for x in r), "s")
+    raised = {"outboard": float(np.mean([x.floor for x in r])), "motor": float(np.mean([x.motor_floor for x in r]))}
+    noise, motor_noise = (
+        _bound(f"raised/{plane}/{where}", "noise in a peak", by / 2, "m") - by for plane, by in raised.items()
+    )
+    outboard = _gained(r, lambda x: x.towards, lambda x: x.peak, {"xo": 1.0, "yo": 1.0}, gains)
+    rest = _each_way(f"standstill/{where}", "m", [x.rest_peak for x in still], ways)
+    planes = {"xo": share, "yo": share, "xi": 1 - share, "yi": 1 - share}
+    motor = _gained(r, lambda x: x.towards_motor, lambda x: x.peak_motor, planes, gains)
+    return {
+        "rise_time": mean("rise_time", "s", lambda x: x.rise) + sampling + between * (1 / slope),
+        "overshoot": mean("overshoot", "1", lambda x: x.overshoot) + between * (1 / case.size),
+        "settling_time": mean("settling_time", "s", lambda x: x.settling) + sampling + band,
+        "peak_outboard": mean("peak_outboard", "m", lambda x: x.peak) + outboard + noise,
+        "peak_motor": mean("peak_motor", "m", lambda x: x.peak_motor) + motor + motor_noise,
+        "excess": mean("excess", "m", lambda x: x.peak) + outboard - rest + noise,
+    }
+
+
 def _repeated(identity: str, unit: str, values: Sequence[float]) -> Estimate:
     """Mean of repeats with its Type A uncertainty."""
     u = float(np.std(values, ddof=1)) / math.sqrt(len(values))
     influence = Influence(id=f"scatter/{identity}", name="scatter of the repeats", u=u, unit=unit, kind="A",
                           distribution="normal", dof=float(len(values) - 1), source=f"{len(values)} steps")  # fmt: skip
     return Estimate.of(float(np.mean(values)), influence)
+
+
+def _each_way(identity: str, unit: str, values: Sequence[float], ways: Sequence[bool]) -> Estimate:
+    """Mean of repeats to and fro: both ways differ by what the machine is, and scatter is what steps of one way do."""
+    parts = [np.array([v for v, w in zip(values, ways, strict=True) if w == way]) for way in (True, False)]
+    parts = [p for p in parts if len(p)]
+    dof = sum(len(p) - 1 for p in parts)
+    pooled = math.sqrt(sum(float(((p - p.mean()) ** 2).sum()) for p in parts) / dof)
+    u = pooled * math.sqrt(sum(1 / len(p) for p in parts)) / len(parts)
+    influence = Influence(id=f"scatter/{identity}", name="scatter of the repeats", u=u, unit=unit, kind="A",
+                          distribution="normal", dof=float(dof), source=f"{len(values)} steps, each way by itself")  # fmt: skip
+    return Estimate.of(float(np.mean([p.mean() for p in parts])), influence)
 
 
 def _bound(identity: str, name: str, half: float, unit: str) -> Estimate:
@@ -100,7 +162,7 @@ def _bound(identity: str, name: str, half: float, unit: str) -> Estimate:
 
 
 def _gained(
-    r: Sequence[Response], towards: Callable[[Response], np.ndarray], peak: Callable[[Response], float],
+    r: Sequence[Moved], towards: Callable[[Moved], np.ndarray], peak: Callable[[Moved], float],
     share: Mapping[str, float], gains: Mapping[str, Estimate],
 ) -> Estimate:  # fmt: skip
     """Zero, with what the gains of the position sensors do to a peak: dr = -(x^2 dg_x + y^2 dg_y) / r for one plane.

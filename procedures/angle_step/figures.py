@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -13,29 +13,44 @@ from procedures.angle_step.estimates import Result
 from procedures.angle_step.steps import Case, Done
 from procedures.servomotor.parameters import stated
 
+FIRST = ("torque-priority", "radius", "orbit")
 SHOWN_S = 0.25  # after the step: the angle has swung by then, and the rotor is back
 
 
 def all_figures(moves: Sequence[Done], results: Mapping[Case, Result], rig: RigFile) -> list[Figure]:
-    """In the order of the report."""
+    """In the order of the report: where captures show the torque current in its bound, that and the excursion first."""
     first = {done.case: done for done in reversed(moves)}  # the first move of each case
     cases = [c for c in results if c.filter_hz == next(iter(results)).filter_hz]
-    largest = [c for c in cases if c.size == max(x.size for x in cases)]
+    sizes = {a: max(c.size for c in cases if c.allocation == a) for a in dict.fromkeys(c.allocation for c in cases)}
+    largest = [c for c in cases if c.size == sizes[c.allocation]]
     limit = stated(rig, "motor.segment_limit").high
-    return [
+    drawn = [
         _orbits([first[c] for c in largest], rig.geometry["clearance"].value),
         *(_angles([first[c] for c in cases if c.size == size]) for size in sorted({c.size for c in cases})),
         _radii([first[c] for c in largest]),
         *(figure for c in largest for figure in _currents(first[c], limit)),
         *_peaks(results),
     ]
+    return (
+        sorted(drawn, key=lambda f: FIRST.index(f.key) if f.key in FIRST else len(FIRST)) if moves[0].swing else drawn
+    )
+
+
+def _called(done: Done, moves: Sequence[Done]) -> str:
+    """By its allocation, and by its size where the moves beside it have another."""
+    alike = all(d.case.size == done.case.size for d in moves)
+    return done.case.allocation if alike else f"{done.case.allocation}, {_deg(done)}"
+
+
+def _sizes(moves: Sequence[Done]) -> str:
+    return f"step of {' and of '.join(dict.fromkeys(_deg(d) for d in moves))}"
 
 
 def _orbits(moves: Sequence[Done], clearance: float) -> Figure:
     turn = np.linspace(0, 2 * np.pi, 181)
     circle = Series("clearance", 1e6 * clearance * np.cos(turn), 1e6 * clearance * np.sin(turn))
-    series = [Series(d.case.allocation, 1e6 * d.move.orbit[0], 1e6 * d.move.orbit[1]) for d in moves]
-    return Figure("orbit", f"Orbit at the outboard sensor, step of {_deg(moves[0])}",
+    series = [Series(_called(d, moves), 1e6 * d.move.orbit[0], 1e6 * d.move.orbit[1]) for d in moves]
+    return Figure("orbit", f"Orbit at the outboard sensor, {_sizes(moves)}",
                   "Path of the shaft off the sensors' zero after one step, within the circle at which it would touch (as T "
                   "Fig. 6.7b).", "x (µm)", "y (µm)", (*series, circle), kind="plane")  # fmt: skip
 
@@ -53,10 +68,10 @@ def _angles(moves: Sequence[Done]) -> Figure:
 
 def _radii(moves: Sequence[Done]) -> Figure:
     series = tuple(
-        Series(d.case.allocation, 1e3 * d.move.t[_shown(d)], 1e6 * np.hypot(*d.move.orbit[:, _shown(d)])) for d in moves
+        Series(_called(d, moves), 1e3 * d.move.t[_shown(d)], 1e6 * np.hypot(*d.move.orbit[:, _shown(d)])) for d in moves
     )
     rest = float(1e6 * max(np.hypot(*d.move.rest_orbit).max() for d in moves))
-    return Figure("radius", f"Distance off centre, step of {_deg(moves[0])}",
+    return Figure("radius", f"Distance off centre, {_sizes(moves)}",
                   "At the outboard sensor, over the time since the step; the line is the greatest at standstill before it.",
                   "time (ms)", "off centre (µm)", series, lines=(("standstill", rest),))  # fmt: skip
 
@@ -94,25 +109,29 @@ def _peaks(results: Mapping[Case, Result]) -> Iterator[Figure]:
     """Excess over the size of the step, and over the filter where there are several."""
     filters = sorted({c.filter_hz for c in results})
     sizes = sorted({c.size for c in results})
-    allocations = list(dict.fromkeys(c.allocation for c in results))
+    each: dict[str, list[Result]] = {}
+    for case, result in results.items():
+        each.setdefault(case.allocation, []).append(result)
     if len(sizes) > 1:
         yield Figure("excess-size", "Excursion over the size of the step",
                      f"Peak at the outboard sensor above that at standstill, mean of the repeats with its 95 % interval; "
                      f"derivative filtered at {filters[0]:g} Hz.", "step (°)", "excess (µm)",
-                     tuple(_excess(a, [results[Case(a, s, filters[0])] for s in sizes], np.degrees(sizes))
-                           for a in allocations))  # fmt: skip
+                     tuple(_excess(a, [r for r in by if r.case.filter_hz == filters[0]], lambda case: np.degrees(case.size))
+                           for a, by in each.items()))  # fmt: skip
     if len(filters) > 1:
         yield Figure("excess-filter", f"Excursion over the derivative's filter, step of {np.degrees(sizes[0]):g}°",
                      "Peak at the outboard sensor above that at standstill, mean of the repeats with its 95 % interval.",
                      "log10 of the filter's frequency (Hz)", "excess (µm)",
-                     tuple(_excess(a, [results[Case(a, sizes[0], f)] for f in filters], np.log10(filters))
-                           for a in allocations))  # fmt: skip
+                     tuple(_excess(a, [r for r in by if r.case.size == sizes[0]], lambda case: np.log10(case.filter_hz))
+                           for a, by in each.items()))  # fmt: skip
 
 
-def _excess(label: str, results: Sequence[Result], x: np.ndarray) -> Series:
+def _excess(label: str, results: Sequence[Result], of: Callable[[Case], float]) -> Series:
     found = [r.estimates["excess"] for r in results]
     u = np.array([coverage_factor(len(r.responses) - 1) * e.u for r, e in zip(results, found, strict=True)])
-    return Series(label, np.asarray(x, np.float64), np.array([1e6 * e.value for e in found]), "both", 1e6 * u)
+    return Series(
+        label, np.array([float(of(r.case)) for r in results]), np.array([1e6 * e.value for e in found]), "both", 1e6 * u
+    )
 
 
 def _shown(done: Done) -> slice:

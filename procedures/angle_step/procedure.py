@@ -217,7 +217,14 @@ procedure = Procedure(
     untold=lambda rig: () if bounds.captured(rig) else CAPTURED,
     step_count=step_count,
     steps_on=lambda rig, plan: step_count(plan) - wiring.STEPS + wiring.steps(rig),
-    reached=("noise/*", "sampling/*"),  # both are read from the recording itself
+    reached=(
+        "noise/*",
+        "sampling/*",
+        "raised/*",
+        "ticks/*",
+        "edges/*",
+        "rounding/*",
+    ),  # both are read from the recording itself
     assumes=assumptions.ANGLE_STEP,
     method=read_method(__file__),
 )

@@ -59,6 +59,7 @@ class Done:
     lost: int
     expected: int
     swing: Swing | None = None
+    target: float = 0.0  # rad, of the angle
 
 
 def read_moves(recording: Recording[Any]) -> list[Done]:
@@ -105,6 +106,7 @@ def _read(recording: Recording[Any], step: Step, machine: Servomotor, share: flo
         step.lost(),
         step.expected(),
         read_swing(recording, labels.get("number")),
+        float(labels["target_rad"]),
     )
 
 

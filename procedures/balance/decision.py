@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -38,6 +38,7 @@ JUST_RAD = 1e-6
 AMPLIFIED = 5.0  # by a loop that nobody knows, at most, of the response of a free shaft
 LIGHTER = 0.25  # of the planned trial weight: what is allowed beside a shaft that moves far; u = 1 mg is 4 % of 25 mg
 MILLIGRAM = 1e-6  # kg
+SMALL_KG_M = 1e-30
 LIGHTEST_KG = 1e-6  # what a laboratory balance still tells from nothing
 
 
@@ -139,10 +140,31 @@ def observe(before: Run, having: Run, weight: Weight, rig: RigFile, known: Known
 
     def size_u() -> float:
         by_forces = propagate(lambda v: float(abs(added(Stand.of(v), -1)[weight.plane])), inputs).u
-        return math.hypot(by_forces, own.radius.u / own.radius.value, own.weight_mass.standard_uncertainty / weight.kg)
+        by_noise = _scatter(nominal, pairs[-1], weight.plane) / abs(u)
+        stated = math.hypot(own.radius.u / own.radius.value, own.weight_mass.standard_uncertainty / weight.kg)
+        return math.hypot(by_forces, by_noise, stated)
 
     nominal = Stand.of({name: e.value for name, e in inputs.items()})
     return Shown(weight, np.array([added(nominal, k) for k in range(len(pairs))]), turn_u, size_u, names_of(rig))
+
+
+def _scatter(s: Stand, reads: tuple[Read, Read], plane: int) -> float:
+    """Standard uncertainty of how much two dwells' unbalances in a plane differ, kg m, along that difference, as their vectors
+    scatter: far from the probes and at low speeds it is what counts."""
+    none, variance = np.zeros(4, complex), 0.0
+    a, b = (runout.unbalances(s, read.turning, none)[0][plane] for read in reads)
+    way = np.conj(b - a) / max(abs(b - a), SMALL_KG_M)
+    for read, at in zip(reads, (a, b), strict=True):
+        covariance = read.vectors.covariance
+        steps = np.sqrt(np.diag(covariance))
+        slopes = np.zeros(steps.size)
+        for k in np.flatnonzero(steps):
+            moved = read.turning.vectors.copy()
+            moved[k // 2] += (1j if k % 2 else 1.0) * steps[k]
+            there = runout.unbalances(s, replace(read.turning, vectors=moved), none)[0][plane]
+            slopes[k] = ((there - at) * way).real / steps[k]
+        variance += float(slopes @ covariance @ slopes)
+    return math.sqrt(max(variance, 0.0))
 
 
 def of_trial(trial: Shown) -> Iterator[Finding]:

@@ -75,6 +75,12 @@ def of_law(around: Sequence[Around], plan: Plan, model: Mapping[str, float], pol
         if found > BEYOND * told:
             text = f"gamma {what} {math.degrees(found):.2f}{unit}; it was told {math.degrees(told):.2f}{unit}."
             yield Finding("phase-limits-differ", text, "gamma", Effect.INDETERMINATE)
+    if furthest > math.pi / 2 / poles:
+        yield Finding(
+            "torque-reversed",
+            f"gamma went to {math.degrees(furthest):.2f}°, and beyond {90 / poles:.2f}° the motor's torque acts the other way: "
+            "only friction held the rotor's angle there.", "gamma", Effect.INDETERMINATE,
+        )  # fmt: skip
     yield from _observed(balanced, model, poles)
 
 

@@ -39,10 +39,15 @@ class Turns:
     distance_after: Array
     gamma: Array
     law: Law
+    tick_s: float
 
     def without(self, turn: int) -> Turns:
         """All but one."""
-        arrays = {f.name: np.delete(getattr(self, f.name), turn, axis=0) for f in fields(self) if f.name != "law"}
+        arrays = {
+            f.name: np.delete(getattr(self, f.name), turn, axis=0)
+            for f in fields(self)
+            if f.name not in ("law", "tick_s")
+        }
         return replace(self, **arrays)
 
     def __len__(self) -> int:
@@ -88,7 +93,7 @@ def grouped(around: Sequence[Around], plan: Plan, way: str, sign: int) -> tuple[
             paths = [np.concatenate([x.path for x in of]) for of in zip(*mine, strict=True)]
             far = [np.concatenate([x.distance for x in of]) for of in zip(*mine, strict=True)]
             gamma = np.concatenate([a.gamma for _, a in mine if a.gamma is not None])
-            out.append(Turns(before, after, paths[0], paths[1], far[0], far[1], gamma, law))
+            out.append(Turns(before, after, paths[0], paths[1], far[0], far[1], gamma, law, mine[0][1].tick_s))
     return tuple(out)
 
 
@@ -199,9 +204,15 @@ def _of_group(t: Turns, plan: Plan, given: Mapping[str, Estimate]) -> dict[str, 
         scale = (1 / given["gain_xo"] + 1 / given["gain_yo"]) / 2
         out[f"error_radius/{when}"] = scale * Estimate.exact(found[f"error_radius/{when}"], "m")
     out["unbalance_ratio"] = out["unbalance/after"] / out["unbalance/before"]
-    told = Influence("resolution/gamma", "resolution of the capture", 1e-8 / math.sqrt(3), "rad", "B", "rectangular")
-    out["gamma_extreme"] = Estimate.of(found["gamma_extreme"], told)
+    out["gamma_extreme"] = Estimate.of(found["gamma_extreme"], _between(t))
     return out
+
+
+def _between(t: Turns) -> Influence:
+    """What a reading leaves open of gamma: in each tick it takes a step of its slew up or down, and a capture that reads every
+    tenth tick may see always the upper or the lower one. At its bound it stands: single precision is left."""
+    half = 1e-8 if np.abs(t.gamma.mean(axis=0)).max() > 0.9999 * t.law.limit else t.law.slew * t.tick_s / 2
+    return Influence("resolution/gamma", "steps of the slew", half / math.sqrt(3), "rad", "B", "rectangular")
 
 
 def paired(given: Mapping[str, Estimate]) -> tuple[Estimate, ...]:

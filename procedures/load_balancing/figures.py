@@ -31,24 +31,30 @@ def _angle(t: Turns) -> Array:
 
 def _vectors(t: Turns, p: Mapping[str, float], way: str) -> Figure:
     """Loads as the two currents feel them: in the frame that turns with gamma."""
-    before = fit.load(t.before.mean(axis=0), 0.0, p) / (fit.factor(0.0, p) / np.abs(fit.factor(0.0, p)))
     gamma = t.gamma.mean(axis=0)
-    turned = fit.factor(gamma, p) / np.abs(fit.factor(gamma, p))
+    still, turned = (fit.factor(x, p) / np.abs(fit.factor(x, p)) for x in (np.zeros(1), gamma))
+    before = fit.load(t.before.mean(axis=0), 0.0, p) / still
     after = fit.load(t.after.mean(axis=0), gamma, p) / turned
-    most = 1.05 * float(np.abs(np.concatenate([before, after])).max())
-    side = -t.law.branch  # i' = -l'/alpha_eff
-    equal = np.array([0.0, most / np.sqrt(2)])
-    series = [
+    most = float(np.abs(np.concatenate([before, after])).max())
+    equal = np.array([0.0, 1.1 * most / np.sqrt(2)])
+    series = (
         Series("without", *_closed(before)),
         Series("with", *_closed(after)),
-        *(Series("", np.array([0.0, z.real]), np.array([0.0, z.imag]), "faint") for z in (*before[::50], *after[::50])),
-        Series("|x| = |y|", side * equal, -equal, "guide"),
-    ]
+        Series("each 30° of the circle", *_fan(before, after), "faint"),
+        Series("alike", -t.law.branch * equal, -equal, "guide"),
+    )
     return Figure("loads", f"Load on the motor around the circle, {way}",
                   "In the frame of the motor's field: what i_x and i_y have to hold. Without balancing the field stands still "
                   "and i_y carries nearly everything; with it the field turns so that both carry alike, on the dashed line. "
                   "Where the bound of gamma is reached the vector leaves it.",
-                  "load across (N)", "load along (N)", tuple(series), kind="plane")  # fmt: skip
+                  "load across (N)", "load along (N)", series, kind="plane")  # fmt: skip
+
+
+def _fan(*loads: fit.Complex) -> tuple[Array, Array]:
+    """Vectors from zero, twelve of each."""
+    ends = np.concatenate([z[:: max(len(z) // 12, 1)] for z in loads])
+    path = np.column_stack([np.zeros(len(ends)), ends, np.zeros(len(ends))]).ravel()
+    return path.real, path.imag
 
 
 def _closed(z: fit.Complex) -> tuple[Array, Array]:

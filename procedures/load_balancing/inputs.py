@@ -27,8 +27,14 @@ def of_amb_plane(l_is: float, l_os: float, l_ia: float, l_m: float) -> float:
 def adopted(rig: RigFile, values: Mapping[str, Estimate]) -> dict[str, float]:
     """What the controller is told of the motor, by meaning: alpha_d and alpha_c N/A, stiffness N/m at the outboard sensors."""
     lengths = {key: rig.geometry[name].value for key, name in LENGTHS.items()}
-    return {"alpha_d": values["alpha_d"].value, "alpha_c": values["alpha_c"].value,
+    return {"alpha_d": at_home(values).value, "alpha_c": values["alpha_c"].value,
             "stiffness": values["alpha_x_prime"].value * of_amb_plane(**lengths)}  # fmt: skip
+
+
+def at_home(values: Mapping[str, Estimate]) -> Estimate:
+    """The direct force constant at the home angle, where the ripple is in it: alpha_d of force-constant is a mean over a turn,
+    up to 2.5 % off."""
+    return values["alpha_ratio"] * values["alpha_c"]
 
 
 def default(rig: RigFile) -> dict[str, float]:
@@ -54,7 +60,7 @@ def of_recording(recording: Recording[Plan]) -> dict[str, Estimate]:
     values = merged([recording.calibration(name) for name in USED])
     machine = conventions(rig)
     inputs = {
-        "alpha_d": values["alpha_d"],
+        "alpha_d": at_home(values),
         "chi": values["alpha_dx"] / values["alpha_d"],
         "ratio": values["alpha_ratio"],
         "gamma_0": values["gamma_0"],

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from bench.analysis import serial
+from bench.analysis import orders, serial
 from bench.analysis.orders import synchronous
 from bench.analysis.sampling import Sampling
 from bench.analysis.tachometer import Tachometer
@@ -32,6 +32,7 @@ PASSAGE = "passage"
 MISSED = "capture-missed"
 LEAST_TURNS = 4  # of a block
 TOGETHER = 8  # blocks of equal turns
+AHEAD = 1.25  # of the speed at which blocks begin: none of them is faster
 ENDS = 0.004  # of the way, left out at either end: there the drive begins and ends its ramp
 NEAR = 0.012  # of a speed, to either side: the turns that its vectors are of
 NEAR_TURNS = 10  # and at least so many
@@ -154,8 +155,20 @@ def _moving(speed: Array) -> slice:
     return slice(int(slow[-1]), int(fast[0])) if slow[0] < fast[0] else slice(int(fast[-1]), int(slow[0]))
 
 
+def batch_turns(speed: float, period_s: float) -> int:
+    """How many turns at `speed` rad/s a batch needs for samples enough: one, where four or more come in a turn."""
+    in_turn = 2 * math.pi / (speed * period_s)
+    return 1 if in_turn >= orders.IN_SHORT else math.ceil((orders.IN_BATCH + 1) / in_turn)
+
+
+def _batches(turns: int, speed: float, period_s: float) -> int:
+    long = batch_turns(speed, period_s)
+    return orders.BATCHES if long == 1 else min(orders.BATCHES, max(LEAST_TURNS, turns // long))
+
+
 def curve(p: Passage, blocks: int) -> Curve:
-    """Vectors of blocks that are equally wide in speed, and at least four turns long.
+    """Vectors of blocks that are equally wide in speed, and at least four turns long, or four batches where few samples come in
+    a turn.
 
     Raises:
         AnalysisError: too few turns.
@@ -173,9 +186,8 @@ def curve(p: Passage, blocks: int) -> Curve:
         k = int(np.searchsorted(angle[:end], 2 * math.pi * whole))
         if k >= end:
             break
-        turns = max(
-            LEAST_TURNS, round(step * speed[k] / (2 * math.pi * smooth[min(max(k - at, 100), smooth.size - 101)]))
-        )
+        least = LEAST_TURNS * batch_turns(AHEAD * speed[k], p.period_s)
+        turns = max(least, round(step * speed[k] / (2 * math.pi * smooth[min(max(k - at, 100), smooth.size - 101)])))
         left = math.floor(angle[end - 1] / (2 * math.pi)) - whole
         count = min(TOGETHER, left // turns)
         if count < 1:
@@ -193,8 +205,9 @@ def _piece(p: Passage, angle: Array, first: int, last: int, turns: int) -> tuple
     low, high = np.searchsorted(angle[: p.moving.stop], 2 * math.pi * np.array([first, last], dtype=float))
     part = slice(max(int(low) - 1, 0), int(high) + 1)  # a sample beyond either end
     fast = float(np.nanmax(p.speeds[part]))
-    orders = (1.0, 2.0) if 2 * fast / (2 * math.pi) < 0.4 / p.period_s else (1.0,)
-    track = synchronous(p.t[part], p.data[:, part], p.tacho, p.sampling, orders=orders, turns=turns)
+    both = (1.0, 2.0) if 2 * fast / (2 * math.pi) < 0.4 / p.period_s else (1.0,)
+    batches = _batches(turns, fast, p.period_s)
+    track = synchronous(p.t[part], p.data[:, part], p.tacho, p.sampling, orders=both, turns=turns, batches=batches)
     edges = p.tacho.time(2 * math.pi * (first + turns * np.arange(track.speed.size + 1)))
     places = np.searchsorted(p.t[part], edges)
     volts = np.maximum.reduceat(p.volts[:, part], np.minimum(places[:-1], p.volts[:, part].shape[1] - 1), axis=1).T
@@ -202,7 +215,7 @@ def _piece(p: Passage, angle: Array, first: int, last: int, turns: int) -> tuple
     moved = parts(moves[..., None])
     covariance = np.einsum("bmci,bmcj->bcij", moved, moved)
     alone, whole = serial.variances(moves)
-    second = track.values[..., 1] if len(orders) > 1 else np.full((track.speed.size, 12), np.nan + 0j)
+    second = track.values[..., 1] if len(both) > 1 else np.full((track.speed.size, 12), np.nan + 0j)
     dof = np.full(track.speed.size, track.dof)
     width = np.abs(np.diff(p.tacho.speed(np.clip(edges, p.tacho.times[0], p.tacho.times[-1]))))
     return track.t, track.speed, width, track.values[:, :, 0], covariance, alone, whole, track.means, volts, second, dof
@@ -244,11 +257,13 @@ def near(p: Passage, recording: Recording[Any], speed: float, law: str) -> tuple
     k = p.moving.start + int(np.nanargmin(np.abs(inside - speed)))
     close = np.flatnonzero(np.abs(inside - speed) < NEAR * speed) + p.moving.start
     turn = 2 * math.pi
-    half = max(float(angle[close[-1]] - angle[close[0]]) / 2, turn * (NEAR_TURNS / 2 + 0.5))
+    least = max(NEAR_TURNS, LEAST_TURNS * batch_turns(AHEAD * speed, p.period_s))
+    half = max(float(angle[close[-1]] - angle[close[0]]) / 2, turn * (least / 2 + 0.5))
     low, high = np.searchsorted(angle[: p.moving.stop], [angle[k] - half, angle[k] + half])
     part = slice(max(int(low), p.moving.start), min(int(high), p.moving.stop))
-    orders = [n for n in (1.0, 2.0, 3.0) if n == 1 or n * speed / turn < 0.4 / p.period_s]
-    track = synchronous(p.t[part], p.data[:, part], p.tacho, p.sampling, orders=orders)
+    told = [n for n in (1.0, 2.0, 3.0) if n == 1 or n * speed / turn < 0.4 / p.period_s]
+    batches = _batches(int((angle[high - 1] - angle[low]) / turn), AHEAD * speed, p.period_s)
+    track = synchronous(p.t[part], p.data[:, part], p.tacho, p.sampling, orders=told, batches=batches)
     captures = recording.captures(passed_rad_s=speed)
     full = full_rate(captures[0], p.machine) if captures else None
     driven = float(np.interp(p.t[k], *p.driven))

@@ -1,9 +1,9 @@
-"""Whether a motor with a frame of its own answers the shaft in it, before it carries: it takes a twentieth of the load, its set
+"""Whether a motor with a frame of its own answers the shaft in it, before it carries: it takes a tenth of the load, its set
 point is moved, and the outboard AMB is watched.
 
 Open-loop currents (`wiring`) show where they push. That the controller turns positions into its frame, and demands back into
 currents, by the same frame is another matter: with the printed sign of T (7.6b) every push is right and the shaft is lost at
-the hand-over. A twentieth of the motor's stiffness is 2 % of the AMB's: of whatever sign it is, the AMB holds.
+the hand-over. A tenth of the motor's stiffness is 4 % of the AMB's: of whatever sign it is, the AMB holds.
 """
 
 from __future__ import annotations
@@ -19,12 +19,13 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from procedures.servomotor.conventions import Servomotor, conventions
 from procedures.servomotor.parameters import stated, write
+from procedures.shared import first_look
 
 NEEDED = ("motor.share", "motor.share_slew", "motor.ref_across", "motor.ref_along")
-SHARE, LEAN_M, LEAN_S = 0.05, 40e-6, 0.4
+SHARE, LEAN_M, LEAN_S = 0.1, 40e-6, 0.4
 OWN_FRAME_RAD = math.radians(10)  # from the AMBs' axes; a motor that stands along them has nothing to turn
 STEP, STEPS = "lean", 3
-LEAST_A, CROSS = 0.05, 0.5  # A of the outboard AMB; a sound motor changes it by 0.15 A, and across by a tenth of that
+LEAST_A, CROSS = 0.05, 0.5  # A of the outboard AMB; a sound motor changes it by 0.3 A, and across by a tenth of that
 WAYS = {"along": "upwards", "across": "sideways"}
 
 
@@ -45,10 +46,10 @@ def _leaned(rig: Rig, record: Recorder, way: str) -> tuple[float, float]:
     write(rig, {f"motor.ref_{key}": LEAN_M * (key == way) for key in WAYS})
     write(rig, {"motor.share": SHARE})
     rig.clock.sleep(SHARE / stated(rig.file, "motor.share_slew").default + LEAN_S)
+    machine = conventions(rig.file)
     with record.step(STEP, way=way, moved_m=LEAN_M if way else 0.0):
-        rig.clock.sleep(LEAN_S / 2)
-        machine, at = conventions(rig.file), rig.levitation.reading
-        found = machine.control("xo", at), machine.control("yo", at)
+        read = first_look.samples(rig, record, machine.coils_of("xo", "yo"), LEAN_S / 2)
+    found = _control(read, machine)
     write(rig, {"motor.share": 0.0, "motor.ref_along": 0.0, "motor.ref_across": 0.0})
     rig.clock.sleep(LEAN_S)
     return found
@@ -72,7 +73,7 @@ def of_leans(recording: Recording[Any]) -> Iterator[Finding]:
         if _wrong(own, other):
             yield Finding(
                 "motor-frame",
-                f"with the motor's set point {LEAN_M * 1e6:.0f} µm {WAYS[way]} and a twentieth of the load on it, the outboard "
+                f"with the motor's set point {LEAN_M * 1e6:.0f} µm {WAYS[way]} and a tenth of the load on it, the outboard "
                 f"AMB's control current changes by {own:+.3f} A along that way and by {other:+.3f} A across; expected relief, "
                 "and hardly anything across: a sign in the controller's own frame, of a coordinate (T 7.6), of a current (T "
                 "7.13) or of its feedback (T 7.14). The motor was not given the shaft.",

@@ -121,11 +121,15 @@ def patient_rig(folder: Path, rig: str = "tsbs12", patience_s: float = PATIENCE_
     rigs = folder / "rigs"
     rigs.mkdir(exist_ok=True)
     text = (ROOT / "rigs" / f"{rig}.toml").read_text()
+    if base := re.search(r'^based_on = "(.*)\.toml"', text, re.MULTILINE):
+        patient_rig(folder, base[1], patience_s)
     patient = rf"\g<1>{patience_s}\g<2>{patience_s}"
     (rigs / f"{rig}.toml").write_text(
         re.sub(r"(watchdog_s = .*?default = )[0-9.]+(, .*?high = )[0-9.]+", patient, text)
     )
-    (rigs / f"{rig}.dbc").write_bytes((ROOT / "rigs" / f"{rig}.dbc").read_bytes())
+    own = ROOT / "rigs" / f"{rig}.dbc"
+    if own.exists():
+        (rigs / own.name).write_bytes(own.read_bytes())
 
 
 @contextmanager

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -69,7 +70,7 @@ def test_at_15_degrees_priority_leaves_a_tenth_at_most(nominal_run: Simulated) -
 
 def test_its_figures_show_torque_within_its_bound(nominal_run: Simulated) -> None:
     drawn = list(procedure.drawn(nominal_run.recording))
-    assert [f.key for f in drawn] == ["orbit", "angle-15", "radius", "torque-static", "amplitudes-static", "torque-priority",
+    assert [f.key for f in drawn] == ["torque-priority", "radius", "orbit", "angle-15", "torque-static", "amplitudes-static",
                                       "amplitudes-priority"]  # fmt: skip
     for figure in drawn:
         draw_figure(figure)
@@ -143,7 +144,10 @@ def swing(i_x: float, i_y: float, torque: float, noise: float = 0.0) -> Swing:
     x, y, t = (np.where(on, value, 0.0) for value in (i_x, i_y, torque))
     random = np.random.default_rng(0).normal(0, noise, (2, 2, 200))
     vectors = np.array([[t + y, -x], [t - y, x]]) + random
-    return Swing(np.arange(200) * 1e-4, {"across": x, "along": y, "torque": t}, vectors, 10.0)
+    still = np.zeros((2, 200))
+    return Swing(
+        np.arange(200) * 1e-4, {"across": x, "along": y, "torque": t}, vectors, 10.0, still[0], still, still, 1.0
+    )
 
 
 def test_the_bound_by_hand() -> None:
@@ -158,7 +162,7 @@ def test_the_largest_amplitude_is_freed_of_sensors_and_noise() -> None:
     """q1 = 8, d1 = -6: 10 A; gains 1.01 and offsets 0.05 A are taken off, and so is half of what noise may add."""
     s = swing(6.0, 4.0, 4.0)
     gains, offsets = np.full((2, 2), 1.01), np.full((2, 2), 0.05)
-    read = Swing(s.t, s.asked, s.vectors * 1.01 + 0.05, s.limit)
+    read = replace(s, vectors=s.vectors * 1.01 + 0.05)
     found = bounds.largest(read, offsets, gains, 0.0)
     assert (found.amplitude, found.segment) == (pytest.approx(10.0), 0)
     assert found.vector == pytest.approx([8.0, -6.0])
@@ -180,11 +184,8 @@ def test_static_steps_may_be_others() -> None:
 def test_the_truth_lies_within(tmp_path: Path, seed: int) -> None:
     run = simulated_run("angle-step", RIG, seed, {**QUICK, "repeats": 3}, tmp_path / "r.mcap")
     truth = truth_of_motion(run)
-    aliased = {"peak_outboard": "outboard", "peak_motor": "motor"}
     for (name, where), estimate in values(run).items():
-        if name in ("rise_time", "overshoot", "final_error", "excess", "amplitude"):
-            assert abs(estimate.value - truth[f"{name}@{where}"]) < 5 * estimate.u, (name, where)
-    assert {key.partition("@")[0] for key in truth} >= {*aliased, "excess", "bound_excess"}
+        assert abs(estimate.value - truth[f"{name}@{where}"]) < 5 * estimate.u, (name, where)
 
 
 def test_what_the_frame_does_not_allow_is_said() -> None:

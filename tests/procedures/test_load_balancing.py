@@ -111,6 +111,22 @@ def test_a_wrong_sign_of_phi_ends_by_the_envelope(tmp_path: Path) -> None:
         run("tsbs12-offset", 1, tmp_path, truth=truth)
 
 
+BEYOND = {"radius_m": 118e-6, "gamma_max_rad": math.radians(12), "beyond_torque": True}
+
+
+def test_a_bound_of_12_degrees_ends_in_a_trip_where_no_friction_holds_the_angle(tmp_path: Path) -> None:
+    """Beyond 11.25 degrees the angle's loop has the wrong sign: cos(8 12 deg) 2.87 N m/A 50 A/rad = -15 N m/rad."""
+    truth = {**nominal(load_rig("tsbs12")), "coulomb": 0.0}
+    with pytest.raises(InterlockError, match="speed reached"):
+        run("tsbs12", 1, tmp_path, BEYOND, truth)
+
+
+def test_a_bound_of_12_degrees_is_told_where_friction_holds_the_angle(tmp_path: Path) -> None:
+    """15 N m/rad times a count of 1.5 mrad is 0.02 N m, less than the Coulomb torque of 0.05 N m."""
+    truth = {**nominal(load_rig("tsbs12")), "motor_offset_x": 5e-6}
+    assert "torque-reversed" in codes(run("tsbs12", 1, tmp_path, BEYOND, truth))
+
+
 def check(**changes: object) -> list[str]:
     return list(load_procedure("load-balancing").check(load_rig("tsbs12"), Plan.model_validate(changes)))
 

@@ -1,0 +1,97 @@
+"""What a capture at the controller's full rate says of a step better than telemetry does: the angle between the counts of its
+encoder, and peaks that are over within a few milliseconds."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from procedures.angle_step.bounds import Swing
+from procedures.angle_step.edges import Edges, edges
+from procedures.angle_step.steps import Done
+
+Array = npt.NDArray[np.float64]
+SMOOTH = 21  # ticks of the parabola that a peak is read from: keeps 99 % of one that lasts 4 ms, noise falls to a third
+DRAWS = 8  # of noise
+ANSWERS = 0.5  # of its greatest: the torque current that answers a step
+BETWEEN = 0.05  # of a count: what a turning point between two edges may be off (0.02 rms of drawn swings)
+TOUCHES, SWING_S = (
+    0.5,
+    5e-3,
+)  # of a count: a swing that ends so near the band leaves it or does not, which is a jump of more
+
+
+@dataclass(frozen=True)
+class Fine:
+    """Of one step, `forward` or back: rise and settling s (`settling_off` s, what a twentieth of a count in the band does to
+    it), overshoot as a share; peaks off the sensors' zero at the outboard sensor and at the motor, m, with their directions,
+    and by how much noise raises each; `slopes` rad/s at 10 and 90 %."""
+
+    forward: bool
+    rise: float
+    settling: float
+    settling_off: float
+    overshoot: float
+    peak: float
+    peak_motor: float
+    towards: Array
+    towards_motor: Array
+    floor: float
+    motor_floor: float
+    slopes: tuple[float, float]
+
+
+def fine(done: Done, swing: Swing, band: float, count: float, noise: float) -> Fine | None:
+    """Of a captured step; None where it is not over within the capture. `band` rad of settling, `noise` m of a reading."""
+    size, way = abs(done.move.step), math.copysign(1.0, done.move.step)
+    start = done.target - done.move.step
+    turns = 2 * np.pi * np.round((swing.angle[0] - start) / (2 * np.pi))
+    found = edges(swing.t, swing.angle, count).since(start + turns, way)
+    low, high = found.crossing(0.1 * size), found.crossing(0.9 * size)
+    if not math.isfinite(high) or not len(tops := [y for _, y in found.turning()]):
+        return None
+    settled, *others = (found.last_outside(size, band + k * count) for k in (0.0, -BETWEEN, BETWEEN, -TOUCHES, TOUCHES))
+    near, touching = others[:2], [s for s in others[2:] if abs(s - settled) > SWING_S]
+    peak, towards, floor = _peak(swing.orbit, noise)
+    motor, towards_motor, motor_floor = _peak(swing.motor, noise * swing.spread)
+    return Fine(
+        forward=way > 0,
+        rise=high - low,
+        settling=settled - _answer(swing),
+        settling_off=max(abs(s - settled) for s in (*near, *touching)),
+        overshoot=max(max(tops) / size - 1, 0.0),
+        peak=peak, peak_motor=motor, towards=towards, towards_motor=towards_motor, floor=floor, motor_floor=motor_floor,
+        slopes=(_slope(found, low), _slope(found, high)),
+    )  # fmt: skip
+
+
+def _answer(swing: Swing) -> float:
+    """When the torque current answers, s: an encoder that changes its count at rest makes it jump too, but less."""
+    torque = np.abs(swing.vectors[:, 0].mean(axis=0))
+    return float(swing.t[int(np.argmax(torque > ANSWERS * torque.max()))])
+
+
+def _peak(orbit: Array, noise: float) -> tuple[float, Array, float]:
+    """Greatest distance off centre, m, its direction (2,), and by how much noise raises it. Of n values alike it is raised by
+    their noise times a number of n alone: with three times the variance on top, which doubles the noise, by as much again."""
+    from scipy import signal
+
+    def smoothed(x: Array) -> Array:
+        out: Array = signal.savgol_filter(x, SMOOTH, 2, axis=-1)
+        return out
+
+    smooth = smoothed(orbit)
+    radius = np.hypot(*smooth)
+    k = int(np.argmax(radius))
+    again = smoothed(np.random.default_rng(0).normal(0.0, math.sqrt(3) * noise, (DRAWS, *orbit.shape))) + smooth
+    raised = float(np.hypot(again[:, 0], again[:, 1]).max(axis=1).mean() - radius[k])
+    return float(radius[k]), smooth[:, k] / max(float(radius[k]), 1e-300), max(raised, 0.0)
+
+
+def _slope(found: Edges, at: float) -> float:
+    """Speed of the angle at a time, rad/s, by the edges about it."""
+    k = int(np.clip(np.searchsorted(found.t, at), 1, len(found.t) - 1))
+    return max(float((found.y[k] - found.y[k - 1]) / max(found.t[k] - found.t[k - 1], 1e-9)), 1e-6)

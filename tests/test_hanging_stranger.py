@@ -1,0 +1,112 @@
+"""The stranger `suspendu` through what `bench list --rig` says it can: it hangs with its centre of mass below both bearings,
+has three planes of probes, and sends a single reading every 4 ms."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bench.analysis.vectors import Vectors
+from bench.cli.motion_truth import truth_of_motion
+from bench.cli.virtual import Simulated, simulated_run
+from bench.findings import Effect, Finding
+from bench.procedure import Measured
+from bench.rigfile import load_rig
+from bench.uncertainty import interval
+from procedures.amb_rotor.stations import stations
+from procedures.balance import decision
+from procedures.balance.steps import Read
+from procedures.run_up.steps import batch_turns
+from procedures.synchronous import bearings
+from procedures.synchronous.runout import Stand
+from procedures.tracking.steps import read_orbits
+
+RIG = str(Path(__file__).resolve().parent / "strangers" / "suspendu.toml")
+
+
+def ran(procedure: str, folder: Path, seed: int = 1, **plan: Any) -> Simulated:
+    return simulated_run(procedure, RIG, seed, plan, folder / "run.mcap")
+
+
+def found(run: Simulated) -> set[str]:
+    return {f.code for f in run.results if isinstance(f, Finding) and f.effect is not Effect.NOTE}
+
+
+def off(run: Simulated) -> dict[str, float]:
+    """Errors over U, of what there is a truth of."""
+    truth = truth_of_motion(run)
+    told = {f"{m.quantity.name}@{m.where}": m.estimate for m in run.results if isinstance(m, Measured)}
+    return {key: (e.value - truth[key]) / interval(e).U for key, e in told.items() if key in truth}
+
+
+def test_a_ring_without_a_place_stands_at_its_bearing() -> None:
+    """Among probes of three planes none are the ring's: 60 and 230 mm above the centre of mass, as the bearings."""
+    assert [r.arm.value for r in stations(load_rig(RIG)).rings if r.arm] == pytest.approx([0.06, 0.23])
+    assert [r.arm for r in stations(load_rig("amb5dof")).rings] == [None, None]  # where its four probes stand
+
+
+def test_a_batch_has_ten_samples_where_fewer_than_four_come_in_a_turn() -> None:
+    """By hand, every 4 ms: 2.756 a turn at 570 rad/s, so that 4 turns have 11.02; 4.03 at 390 rad/s."""
+    assert [batch_turns(w, 4e-3) for w in (570.0, 390.0, 10.0)] == [4, 1, 1]
+
+
+def test_what_dwells_scatter_is_in_doubt_of_a_trial_weight() -> None:
+    """As the unbalance scatters that drawn vectors give."""
+    rig, draws = load_rig("amb5dof"), np.random.default_rng(1)
+    stand = Stand.of({n: e.value for n, e in bearings.collect_inputs(rig, bearings.Known(None, 0.05, 2e-5)).items()})
+    u = np.array([5e-8] * 4 + [2e-3] * 8)
+    values = np.array([1e-6, 1e-6j, 4e-6, 4e-6j] + [0.04] * 8, complex)
+    covariance = np.diag(np.repeat(u**2, 2))
+
+    def read(add: complex) -> Read:
+        return Read(
+            500.0, np.array([0.0] * 4 + [2.0] * 8), Vectors(values + add * np.array([1.0] * 4 + [0.0] * 8), covariance)
+        )
+
+    reads = (read(0.0), read(1e-6))
+    said = decision._scatter(stand, reads, 0)
+    a, b = (decision.runout.unbalances(stand, r.turning, np.zeros(4, complex))[0][0] for r in reads)
+    way = np.conj(b - a) / abs(b - a)
+    differences = []
+    for _ in range(400):
+        one, other = (
+            decision.runout.unbalances(
+                stand, decision.replace(r.turning, vectors=values + (draws.normal(size=12) + 1j * draws.normal(size=12)) * u),
+                np.zeros(4, complex),
+            )[0][0]
+            for r in reads
+        )  # fmt: skip
+        differences.append(((other - one) * way).real)
+    assert said == pytest.approx(np.std(differences), rel=4 / math.sqrt(2 * 400))
+
+
+@pytest.mark.timeout(120)
+def test_set_points_are_followed_and_act_when_they_are_written(tmp_path: Path) -> None:
+    """A window of four periods took the brake of the loop for the start: 1.2 ms late, phases 1.2 U off on every seed."""
+    run = ran("tracking", tmp_path)
+    assert found(run) == set()
+    assert max(abs(orbit.t_0) for orbit in read_orbits(run.recording)) < 3e-4
+    errors = off(run)
+    assert len(errors) >= 8
+    assert abs(errors["phase_lag@z, as set, 0.5 Hz, 40 × 60 µm, at rest"]) < 0.8
+
+
+@pytest.mark.long
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize("procedure", ["run-up", "coast-down", "balance", "spindown"])
+def test_nothing_is_wrong_with_a_sound_stranger(procedure: str, tmp_path: Path) -> None:
+    run = ran(procedure, tmp_path)
+    assert found(run) == set()
+    errors = off(run)
+    assert errors
+    assert math.sqrt(sum(x * x for x in errors.values()) / len(errors)) < 1
+    assert max(map(abs, errors.values())) < 2
+
+
+def test_a_step_by_telemetry_this_slow_says_so(tmp_path: Path) -> None:
+    run = ran("step", tmp_path, axes=["y"])
+    assert found(run) == {"telemetry-too-slow"}
