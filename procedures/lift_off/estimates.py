@@ -23,8 +23,8 @@ from procedures.shared.step_table import StepTable
 Array = npt.NDArray[np.float64]
 EARLY_N, EARLY_HALF_N = (0.033, 0.27), (0.015, 0.15)
 """An end goes by so much force early, within so much more, the second number times sin^2 of how far the force is turned: the
-loop that holds x answers the noise of its probe, which lifts by that sine; a push of a few milliseconds is enough where the ring
-hardly carries; and the ramp goes on meanwhile."""
+loop that holds x answers the noise of its probe, which lifts by that sine; a push of a few milliseconds is enough where the
+ring hardly carries; and the ramp goes on meanwhile."""
 ASIDE_N = 0.015  # by how much that differs between the signs of gamma
 RIPPLE = 0.025  # of the force constants (T 5.25), over the rotor's angle
 COUNT_RAD = math.pi / 4096 / 2  # where the rotor stands within its encoder's count: half of what it may be off
