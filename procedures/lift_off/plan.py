@@ -12,7 +12,7 @@ from bench.procedure import BenchPlan
 class Plan(BenchPlan):
     """Settings, SI."""
 
-    gamma_max_rad: float = Field(math.radians(4.5), gt=0)  # how far the phase angle is turned, each way
+    gamma_max_rad: float = Field(math.radians(5.2), gt=0)  # how far the phase angle is turned, each way
     rate_rad_s: float = Field(
         math.radians(0.2), gt=0, le=math.radians(0.3)
     )  # of the ramp; the budget is for no faster one

@@ -25,6 +25,7 @@ from sim_backend.machines.tsbs import liftoff
 from sim_backend.machines.tsbs.params import PlantParams
 from sim_backend.truth import nominal
 
+pytestmark = pytest.mark.timeout(400)  # the chain before it, on a machine that is busy
 NAME = "lift-off"
 QUICK = {"repeats": 2, "dwell_s": 0.5}
 STIFF = {"levels_m": [-40e-6, -20e-6, 0.0, 20e-6, 40e-6], "settle_s": 0.3, "average_s": 0.3}
