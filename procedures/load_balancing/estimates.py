@@ -23,6 +23,7 @@ Complex = npt.NDArray[np.complex128]
 Numbers = Mapping[str, float]
 LOADS_SEEN, FACTS_SEEN = "from the loads", "from the facts"
 LINEAR = ("peak_i_y/before", "peak_i_y/after", "reduction", f"predicted/{LOADS_SEEN}", f"predicted/{FACTS_SEEN}")
+RIPPLE = 0.025  # of the force with 16 times the angle, T (5.25)
 SENSORS = tuple(f"{what}_m{k}" for what in ("gain", "offset") for k in range(1, 5))
 
 
@@ -194,6 +195,9 @@ def extreme(gamma: Array, limit: float) -> float:
 
 def _of_group(t: Turns, plan: Plan, given: Mapping[str, Estimate]) -> dict[str, Estimate]:
     out = linearised(lambda p: of_currents(t, plan, p), given)
+    ripple = Estimate.of(0.0, _ripple(plan, given["pole_pairs"].value))
+    for key, share in (("peak_i_y/after", out["peak_i_y/after"].value), ("reduction", 1 + out["reduction"].value)):
+        out[key] = out[key] + ripple * share
     values = {name: e.value for name, e in given.items()}
     found = statistics(t, plan, values)
     pairs = paired(given)
@@ -206,6 +210,14 @@ def _of_group(t: Turns, plan: Plan, given: Mapping[str, Estimate]) -> dict[str, 
     out["unbalance_ratio"] = out["unbalance/after"] / out["unbalance/before"]
     out["gamma_extreme"] = Estimate.of(found["gamma_extreme"], _between(t))
     return out
+
+
+def _ripple(plan: Plan, pole_pairs: float) -> Influence:
+    """T (5.25), alpha_3 sin(P theta): by it i_x gives a force upwards where the rotor does not stand at its home angle, but
+    anywhere within a count of the encoder. As a share of i_y, which is as large; two rectangular ones in a product."""
+    half = 2 * pole_pairs * plan.count_rad / 2 * RIPPLE
+    return Influence("ripple/angle", "force ripple where the rotor stands", half / 3, "1", "B", "triangular",
+                     source="T (5.25), 2.5 % of alpha_d, half a count")  # fmt: skip
 
 
 def _between(t: Turns) -> Influence:

@@ -27,6 +27,7 @@ class Plan(BenchPlan):
     model: Literal["adopted", "default"] = "adopted"  # what the controller is told of the motor
     settle_s: float = Field(2.0, gt=0)  # after the motor has taken the shaft
     bin_s: float = Field(0.01, gt=0, le=0.1)  # of which means are taken around the circle
+    count_rad: float = Field(2 * math.pi / 4096, gt=0)  # of the encoder
     max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
 
     @property
