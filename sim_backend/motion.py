@@ -148,13 +148,14 @@ class DragAsked:
 class SpeedsAsked:
     """Runs at the torque limit: `settings` as those of steps; what is written `before` them, one after the other, once the
     shaft is held; the parameters that choose each of the `sharings`, by its name; the speed reference that guards them, rad/s;
-    for how long each is watched in each direction, s."""
+    for how long each is watched in each direction, s, and how long the current sensors have drifted by then, s."""
 
     settings: Numbers
     before: Sequence[Numbers]
     sharings: Mapping[str, Numbers]
     guard: float
     seconds: float
+    at_s: float
 
 
 @dataclass(frozen=True)

@@ -311,7 +311,7 @@ def _maximum_speed(done: Simulated) -> Found:
     from procedures.maximum_speed.plan import HALF, OP
     from procedures.maximum_speed.procedure import WORDS
     from procedures.maximum_speed.running import guard_of, limit_of
-    from procedures.maximum_speed.steps import SET_POINT
+    from procedures.maximum_speed.steps import RUN, SET_POINT
     from procedures.servomotor.hold import GAINS
     from procedures.servomotor.parameters import chosen, named, stated
     from sim_backend.motion import DragAsked, SpeedsAsked
@@ -329,7 +329,9 @@ def _maximum_speed(done: Simulated) -> Found:
          **chosen(rig, "torque", "limit")},
     )  # fmt: skip
     sharings = {s: chosen(rig, "sharing", s) for s in (HALF, OP)}
-    true = of.speeds(rig, done.drawn, SpeedsAsked(_settings(done), before, sharings, guard_of(rig, plan), TOP_S))
+    begun = [step.start_ns - done.recording.start_ns for step in done.recording.steps(RUN)]
+    at_s = 1e-9 * sum(begun) / max(len(begun), 1)
+    true = of.speeds(rig, done.drawn, SpeedsAsked(_settings(done), before, sharings, guard_of(rig, plan), TOP_S, at_s))
     for s, name in ((HALF, "half"), (OP, "op")):
         yield f"speed_{name}", "", true[s]["speed"]
         yield f"predicted_{name}", "", true[s]["speed"]

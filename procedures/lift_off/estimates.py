@@ -21,16 +21,17 @@ from procedures.shared.gradients import by_inputs
 from procedures.shared.step_table import StepTable
 
 Array = npt.NDArray[np.float64]
-EARLY_N, EARLY_HALF_N = 0.04, 0.03
-"""An end goes by so much force early, within so much more: the loop that holds x answers the noise of its probe, a push of a
-few milliseconds is enough where the ring hardly carries, and the ramp goes on meanwhile."""
-ASIDE_N, ASIDE_SHARE = 0.02, 0.25  # of that, and of the ripple, what differs between the signs of gamma
+EARLY_N, EARLY_HALF_N = (0.033, 0.27), (0.015, 0.15)
+"""An end goes by so much force early, within so much more, the second number times sin^2 of how far the force is turned: the
+loop that holds x answers the noise of its probe, which lifts by that sine; a push of a few milliseconds is enough where the
+ring hardly carries; and the ramp goes on meanwhile."""
+ASIDE_N = 0.015  # by how much that differs between the signs of gamma
 RIPPLE = 0.025  # of the force constants (T 5.25), over the rotor's angle
-COUNT_RAD = math.pi / 4096  # half a count of the encoder: the rotor may stand so much further
+COUNT_RAD = math.pi / 4096 / 2  # where the rotor stands within its encoder's count: half of what it may be off
 AWAY_N = (
     0.03  # what the statics leave out: a side pull, 0.04 N/A^2 (T Table 5.3) 5 A times what segments differ by, 0.15 A
 )
-WRITE_S = 0.01  # within which a write of gamma acts: a request and its reply
+WRITE_S = 0.005  # within which a write of gamma acts: a request and its reply
 
 
 @dataclass(frozen=True)
@@ -67,12 +68,11 @@ def evaluate(recording: Recording[Plan], rest: StepTable[Rest]) -> Analysis:
         predicted, limit, slope = _predicted(machine, low, dwells, held, inputs)
         found |= predicted
     if len(gammas):
-        values, half = (
-            {name: e.value for name, e in inputs.items()},
-            float(gammas[:, 1].mean() - gammas[:, 0].mean()) / 2,
-        )
-        off = max(abs(r.turned(k)) for r, k in zip(ramps, lifted, strict=True) if k is not None) + COUNT_RAD
-        found |= _angles(gammas, slope, fit.ripple(values, limit, half + values["gamma_0"], off, RIPPLE), plan)
+        values = {name: e.value for name, e in inputs.items()}
+        turned = float(gammas[:, 1].mean() - gammas[:, 0].mean()) / 2 + values["gamma_0"]
+        force = math.sin(values["pole_pairs"] * (turned - values["gamma_0"])) ** 2
+        ripple = [fit.ripple(values, limit, turned, off, RIPPLE) for off in _off(ramps, lifted)]
+        found |= _angles(gammas, slope, force, (ripple[0], ripple[1]), plan)
     return Analysis(rest, dwells, held, ramps, lifted, gammas, found, limit)
 
 
@@ -114,13 +114,25 @@ def _depth(reading: Array, gain: Estimate) -> Estimate:
     return Estimate(float(-reading.mean()), "m", {scatter: 1.0} if u else {}) / gain
 
 
-def _angles(gammas: Array, slope: float, ripple_N: float, plan: Plan) -> dict[str, Estimate]:
-    """Half difference and mean of both angles, each from what the repeats gave; `slope` N/rad."""
+def _off(ramps: Sequence[Ramped], lifted: Sequence[int | None]) -> tuple[float, float]:
+    """How far the rotor stands off its home angle when the end goes, rad: what differs between the signs of gamma, which is in
+    half the difference of the angles, and what both share, which is in their middle."""
+    done = [(r.labels.way, r.turned(k)) for r, k in zip(ramps, lifted, strict=True) if k is not None]
+    below, above = (float(np.mean([angle for way, angle in done if way == wanted])) for wanted in (-1, 1))
+    return abs(above - below) / 2 + COUNT_RAD, abs(above + below) / 2 + COUNT_RAD
+
+
+def _angles(
+    gammas: Array, slope: float, square: float, ripple_N: tuple[float, float], plan: Plan
+) -> dict[str, Estimate]:  # fmt: skip
+    """Half difference and mean of both angles, each from what the repeats gave; `slope` N/rad, `square` sin^2 of how far the
+    force is turned, `ripple_N` in each."""
     out = {}
-    early = Estimate.of(EARLY_N, _bound("lift/early", "motion at the threshold", EARLY_HALF_N, "N"))
-    early = early + Estimate.of(0.0, _bound("lift/ripple", "ripple of the force off the home angle", ripple_N, "N"))
-    half = ASIDE_N + ASIDE_SHARE * ripple_N
-    aside = Estimate.of(0.0, _bound("lift/aside", "motion at the threshold, one way", half, "N"))
+    at, half = (one[0] + one[1] * square for one in (EARLY_N, EARLY_HALF_N))
+    early = Estimate.of(at, _bound("lift/early", "motion at the threshold", half, "N"))
+    early = early + Estimate.of(0.0, _product("lift/ripple", ripple_N[0]))
+    aside = Estimate.of(0.0, _bound("lift/aside", "motion at the threshold, one way", ASIDE_N, "N"))
+    aside = aside + Estimate.of(0.0, _product("lift/ripple-aside", ripple_N[1]))
     late = Estimate.of(0.0, _bound("lift/write", "when gamma begins to turn", WRITE_S * plan.rate_rad_s, "rad"))
     ways: tuple[tuple[str, Array, Estimate], ...] = (
         ("gamma_lift", (gammas[:, 1] - gammas[:, 0]) / 2, early * (1 / slope) + late if slope > 0 else late),
@@ -134,6 +146,12 @@ def _angles(gammas: Array, slope: float, ripple_N: float, plan: Plan) -> dict[st
         total = Estimate(float(values.mean()), "rad", {scatter: 1.0} if u else {}) + more
         out[name] = Estimate(total.value, "rad", total.sensitivities)
     return out
+
+
+def _product(identity: str, half_N: float) -> Influence:
+    """Of ripple times angle, each anywhere within its range: small values are likelier."""
+    name = "ripple of the force off the home angle"
+    return Influence(identity, name, half_N / math.sqrt(6), "N", "B", "triangular")
 
 
 def _bound(identity: str, name: str, half: float, unit: str) -> Influence:

@@ -12,8 +12,10 @@ from bench.procedure import BenchPlan
 class Plan(BenchPlan):
     """Settings, SI."""
 
-    gamma_max_rad: float = Field(math.radians(4.5), gt=0)  # how far the phase angle is turned, each way
-    rate_rad_s: float = Field(math.radians(0.2), gt=0)  # of the ramp
+    gamma_max_rad: float = Field(math.radians(5.2), gt=0)  # how far the phase angle is turned, each way
+    rate_rad_s: float = Field(
+        math.radians(0.2), gt=0, le=math.radians(0.3)
+    )  # of the ramp; the budget is for no faster one
     back_rad_s: float = Field(math.radians(5.0), gt=0)  # back to zero, with the end up
     repeats: int = Field(5, ge=2)  # with each sign of the phase angle
     rest_s: float = Field(0.5, ge=0.1)  # on both rings, before the first lift

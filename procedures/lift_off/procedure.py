@@ -1,4 +1,4 @@
-"""Lift-off by the phase angle: from which gamma on the motor lifts its end from the ring (thesis 6.7.2).
+"""Lift-off by the phase angle: from which gamma on the motor lifts its end from the ring (thesis 6.7.3, Fig. 6.11).
 
 Measurands: gamma_lift, half the difference of the phase angles, above and below, from which on the motor at its limit of
 current lifts the outboard end while the inboard AMB holds the other one; gamma_zero, their middle; rest_depth, how deep the end

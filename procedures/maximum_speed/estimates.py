@@ -83,7 +83,7 @@ def gathered(windows: list[Window], sharing: str, counts: int) -> Shared:
     seen = np.concatenate([r - r.mean(axis=0) for r in rows.values()])
     means = {d: np.mean([w.segments for w in found], axis=0) for d, found in ways.items()}
     both = (*ways[1], *ways[-1])
-    u = math.sqrt(sum(fit.count_u(w.turning.speed, w.turning.turns, counts) ** 2 for w in both)) / len(both)
+    u = math.sqrt(sum(fit.count_u(w.turning, counts) ** 2 for w in both)) / len(both)
     along = sum(d * np.mean([w.told.along.mean() for w in found]) for d, found in ways.items()) / 2
     # a lag turns with the direction, and so does the torque current: what it puts across the field does not
     across = sum(np.mean([w.told.across.mean() for w in found]) for found in ways.values()) / 2
@@ -201,7 +201,7 @@ def _scatter(sharing: str, shared: Shared) -> dict[str, Estimate]:
                   distribution="normal", dof=float(dof), source=f"{n} runs, each direction by itself")
         for k in range(SEEN)
     ]  # fmt: skip
-    count = Influence(id=f"encoder/{sharing}", name="count of the encoder, both ends of each window", u=shared.counts,
+    count = Influence(id=f"encoder/{sharing}", name="counts of the encoder", u=shared.counts,
                       unit="rad/s", kind="B", distribution="normal")  # fmt: skip
     out = {}
     for row, name in enumerate(("speed", "current", "bound")):

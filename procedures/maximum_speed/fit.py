@@ -44,22 +44,23 @@ def share(limit: float, i_x: Array, i_y: Array, sharing: str) -> Array:
 
 @dataclass(frozen=True)
 class Turning:
-    """Mean `speed` over `turns` whole turns, which the first `samples` are, rad/s with its sign, and `ripple`, the rms of its
-    orders 1 to 4, rad/s."""
+    """Mean `speed` over whole turns, which the first `samples` are, rad/s with its sign; `seconds` that they last; `ripple`,
+    the rms of its orders 1 to 4, rad/s."""
 
     speed: float
     turns: int
     samples: int
+    seconds: float
     ripple: float
 
 
 def turning(t: Array, angle: Array) -> Turning:
     """Of angles (n,) rad within a turn at times (n,) s.
 
-    Times at which the angle passes where it began, turn after turn, are interpolated between samples: a whole number of turns,
-    so that what the encoder says wrongly over a turn is left out, and what runout does to the speed. The ripple is that of the
-    harmonics of the unwrapped angle over itself: theta = w t + sum a_n cos(n theta) + b_n sin(n theta) gives
-    w' = w sum n (b_n cos - a_n sin), which no filter has weakened.
+    A whole number of turns, so that what the encoder says wrongly over a turn is left out, and what runout does to the speed.
+    Over them theta = theta_0 + w t + sum a_n cos(n theta) + b_n sin(n theta) is fitted to every sample: w takes part in the
+    counts of all of them, and not of the two at the ends alone, and w' = w sum n (b_n cos - a_n sin) is the ripple, which no
+    filter has weakened.
 
     Raises:
         AnalysisError: it turns less than twice.
@@ -72,28 +73,25 @@ def turning(t: Array, angle: Array) -> Turning:
         raise AnalysisError(
             f"window: the rotor turns {turned[-1] / (2 * math.pi):.2f} times; expected {FEWEST_TURNS} or more"
         )
-    end = 2 * math.pi * turns
-    last = int(np.searchsorted(turned, end))
-    part = (end - turned[last - 1]) / (turned[last] - turned[last - 1])
-    seconds = float(t[last - 1] + part * (t[last] - t[last - 1]) - t[0])
-    speed = end / seconds
-    x, time = turned[: last + 1], t[: last + 1]
+    last = int(np.searchsorted(turned, 2 * math.pi * turns))
+    x, time = turned[:last], t[:last] - t[0]
     waves = [wave(n * x) for n in ORDERS for wave in (np.cos, np.sin)]
-    design = np.column_stack([np.ones_like(time), time - time[0], *waves])
-    terms = np.linalg.lstsq(design, x, rcond=None)[0][2:].reshape(-1, 2)
+    found = np.linalg.lstsq(np.column_stack([np.ones_like(time), time, *waves]), x, rcond=None)[0]
+    speed, terms = float(found[1]), found[2:].reshape(-1, 2)
     size = float((np.array(ORDERS) ** 2 * (terms**2).sum(axis=1)).sum())
-    return Turning(way * speed, turns, last, speed * math.sqrt(size / 2))
+    return Turning(way * speed, turns, last, float(time[-1]), speed * math.sqrt(size / 2))
+
+
+def count_u(t: Turning, counts: int) -> float:
+    """Standard uncertainty of a speed by the encoder's counts, rad/s: each sample is off by a part of one (rectangular, u of
+    a count/sqrt 12), and the slope of n samples over T by sqrt 12/(T sqrt n) of that."""
+    return 2 * math.pi / counts / (t.seconds * math.sqrt(t.samples))
 
 
 def whole_turns(samples: int, rate_hz: float, speed: float) -> int:
     """How many of `samples` at a rate are whole turns: of currents that swing with the turn a part of one has another mean."""
     turn = 2 * math.pi / abs(speed) * rate_hz
     return round(int(samples / turn) * turn)
-
-
-def count_u(speed: float, turns: int, counts: int) -> float:
-    """Standard uncertainty of a speed by the encoder's count at both ends of whole turns, rad/s: rectangular, 1/(counts n)."""
-    return abs(speed) / (counts * turns) / math.sqrt(6)
 
 
 @dataclass(frozen=True)

@@ -20,13 +20,22 @@ from bench.uncertainty import interval
 from procedures.lift_off import fit
 from procedures.lift_off.plan import Plan
 from procedures.lift_off.procedure import check, procedure
+from procedures.servomotor.conventions import conventions
 from sim_backend.machines.tsbs import liftoff
 from sim_backend.machines.tsbs.params import PlantParams
+from sim_backend.truth import nominal
 
+pytestmark = pytest.mark.timeout(400)  # the chain before it, on a machine that is busy
 NAME = "lift-off"
 QUICK = {"repeats": 2, "dwell_s": 0.5}
 STIFF = {"levels_m": [-40e-6, -20e-6, 0.0, 20e-6, 40e-6], "settle_s": 0.3, "average_s": 0.3}
 COUPLE = {"settle_s": 0.3, "average_s": 0.2}
+CHAIN = {
+    "amb-calibration": {"angles": 9, "settle_s": 0.3, "average_s": 0.2},
+    "force-constant": {"levels_A": [-1.5, -0.75, 0.0, 0.75, 1.5], "ramp_A_s": 5, "settle_s": 0.15, "average_s": 0.2},
+    "negative-stiffness": STIFF,
+    "force-coupling": COUPLE,
+}
 BY_HAND = {
     "alpha_d": 12.1, "alpha_c": 14.3, "gamma_0": 0.0, "pole_pairs": 8.0, "alpha_x_prime": 322.3e3, "chi": 1.0,
     "l_is": 0.161, "l_os": 0.052, "z_oa": 0.010, "motor_to_outboard": 0.112,
@@ -195,9 +204,52 @@ def test_a_stiffness_of_another_machine_disagrees(known: dict[str, Calibration],
     assert "lift-disagrees" in {f.code for f in serious(run)}
 
 
+def facts_of(rig: str, seed: int, folder: Path, truth: Mapping[str, float] | None = None) -> dict[str, Calibration]:
+    """The chain on one machine at its short plans."""
+    out: dict[str, Calibration] = {}
+    for name, plan in CHAIN.items():
+        out[name] = simulated_run(name, rig, seed, plan, folder / f"{name}.mcap", truth, out).calibration()
+    return out
+
+
+@pytest.mark.long
+def test_the_printed_order_on_the_nominal_stand(tmp_path: Path) -> None:
+    """T Fig. 6.11: i_y saturated and no lift at gamma 0, lift at 1.5 degrees. By hand 1.11 at 218 um."""
+    centre = nominal(load_rig("tsbs12-close"))
+    run = simulated_run(NAME, "tsbs12-close", 0, QUICK, tmp_path / "o.mcap", centre,
+                        facts_of("tsbs12-close", 0, tmp_path, centre))  # fmt: skip
+    assert serious(run) == []
+    assert math.degrees(estimates(run)["gamma_lift"].value) == pytest.approx(1.10, abs=0.02)
+    a = procedure.evaluated(run.recording).result
+    for r, lifted in zip(a.ramps, a.lifted, strict=True):
+        assert lifted is not None
+        assert np.degrees(abs(r.gamma[lifted])) < 1.5
+    assert a.dwells.stack(conventions(run.recording.rig).segments)[0].min() > 9.9  # i_y is saturated at gamma 0
+    assert {labels.kind for labels in a.dwells.labels} == {"dwell"}
+    assert (a.dwells.flags & conventions(run.recording.rig).contact_outboard).all()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(6))
+def test_drawn_stands_end_as_their_own_prediction_says(tmp_path: Path, seed: int) -> None:
+    known = facts_of("tsbs12-close", seed, tmp_path)
+    run = simulated_run(NAME, "tsbs12-close", seed, QUICK, tmp_path / "o.mcap", None, known)
+    codes = {f.code: f.text for f in serious(run)}
+    if "gamma_lift" in run.truth:
+        assert codes == {}
+        assert estimates(run)["gamma_lift"].value == pytest.approx(run.truth["gamma_lift"], abs=math.radians(0.04))
+    else:
+        assert set(codes) == {"lifts-at-zero"}
+        assert "as predicted" in codes["lifts-at-zero"]
+
+
 @pytest.mark.parametrize(
     ("plan", "said"),
-    [({"gamma_max_rad": 0.2}, "goes from"), ({"rate_rad_s": 0.5}, "ascending"), ({"rate_rad_s": 0.001}, "at most 55")],
+    [
+        ({"gamma_max_rad": 0.2}, "goes from"),
+        ({"back_rad_s": 0.002}, "ascending"),
+        ({"rate_rad_s": 0.001}, "at most 55"),
+    ],
 )
 def test_what_cannot_work_is_told_before_anything_starts(plan: dict[str, float], said: str) -> None:
     rig = load_rig("tsbs12")
@@ -207,12 +259,14 @@ def test_what_cannot_work_is_told_before_anything_starts(plan: dict[str, float],
 
 def test_figures_show_position_and_currents(sound: Simulated) -> None:
     drawn = {f.key: f for f in procedure.drawn(sound.recording)}
-    assert set(drawn) == {"position", "currents"}
+    assert set(drawn) == {"position", "lifts", "currents"}
     position = drawn["position"]
     bars = [s for s in position.series if s.style == "both"]
     assert len(bars) == 2
     lifted = math.degrees(estimates(sound)["gamma_lift"].value + estimates(sound)["gamma_zero"].value)
     assert bars[1].x.min() - 0.03 < lifted < bars[1].x.max() + 0.03
+    mean, predicted = drawn["lifts"].series[1:]
+    assert abs(mean.y[0] - predicted.y[0]) < 1.5 * np.hypot(mean.u[0], predicted.u[0])
 
 
 def test_measured_come_by_their_names(sound: Simulated) -> None:

@@ -131,8 +131,9 @@ def test_a_commutation_that_is_meant_to_be_late_is_sound(tmp_path: Path, known: 
     found, true = results(done), truth_of_motion(done)
     assert serious(done) == {}
     assert found["ratio"].value / found["ratio_predicted"].value == pytest.approx(1, abs=0.01)
-    for name in ("speed_op", "predicted_op", "ratio"):
-        assert abs(found[name].value - true[name]) < 1.6 * interval(found[name]).U, name
+    for name in ("speed_op", "ratio"):
+        assert found[name].value == pytest.approx(true[name], rel=5e-4), name
+    assert abs(found["predicted_op"].value - true["predicted_op"]) < 1.6 * interval(found["predicted_op"]).U
 
 
 def test_what_is_missing_is_said_with_the_commands_that_make_it(tmp_path: Path) -> None:

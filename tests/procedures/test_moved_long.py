@@ -33,11 +33,6 @@ def wanted(rig: str, prefixes: tuple[str, ...]) -> dict[str, float]:
         ),
         ("tsbs12", "spindown", ("polar", "ring", "viscous", "coulomb", "detent", "i_m", "drive", "tilt")),
         (
-            "tsbs12-drag",
-            "maximum-speed",
-            ("polar", "viscous", "coulomb", "beta_4", "gamma", "segment_gain", "i_m", "drive_drag"),
-        ),
-        (
             "amb5dof",
             "tracking",
             ("i_yi_n.offset", "i_zi_n.offset"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +15,7 @@ from sim_backend import core
 from sim_backend.controller.parameters import Parameters
 from sim_backend.core.plant import TICK_S
 from sim_backend.machine import Truth
+from sim_backend.machines.tsbs.params import PlantParams
 from sim_backend.machines.tsbs.plant import TRACE, Plant
 from sim_backend.motion import Numbers, SpeedsAsked
 
@@ -30,7 +32,7 @@ def _ticks(seconds: float) -> int:
 def speeds(rig: RigFile, drawn: Truth, asked: SpeedsAsked) -> Mapping[str, Mapping[str, float]]:
     """By sharing: `speed` rad/s, mean of both directions, `bound` A of the torque current, and `ripple` rad/s, the rms of the
     speed's orders 1 to 4."""
-    plant = Plant(drawn.plant, drawn.noise ^ OTHER_NOISE)
+    plant = Plant(_drifted(drawn.plant, asked.at_s), drawn.noise ^ OTHER_NOISE)
     parameters = Parameters(rig, drawn, plant)
 
     def write(values: Numbers) -> None:
@@ -57,11 +59,35 @@ def speeds(rig: RigFile, drawn: Truth, asked: SpeedsAsked) -> Mapping[str, Mappi
     }
 
 
+def _drifted(p: PlantParams, at_s: float) -> PlantParams:
+    """With its current sensors as they are at a time, for good: 1e-4 A are more than what a run leaves open."""
+
+    def offsets(zero: tuple[float, ...], rate: tuple[float, ...]) -> tuple[float, ...]:
+        return tuple(z + r * at_s for z, r in zip(zero, rate, strict=True))
+
+    segments = offsets(p.segment_offset, p.segment_drift)
+    return replace(
+        p, current_offset=offsets(p.current_offset, p.current_drift), current_drift=(0.0,) * len(p.current_drift),
+        segment_offset=(segments[0], segments[1], segments[2], segments[3]), segment_drift=(0.0,) * 4,
+    )  # fmt: skip
+
+
 def _watched(plant: Plant, seconds: float, way: int) -> tuple[float, float, float]:
-    began, chunks = float(plant.state()["s"][5]), max(1, round(seconds / CHUNK_S))
-    bounds = [plant.run(_ticks(CHUNK_S), 1)[1][:, AT["torque_bound"]].mean() for _ in range(chunks)]
-    speed = way * (float(plant.state()["s"][5]) - began) / (chunks * CHUNK_S)
-    return speed, float(np.mean(bounds)), _ripple(plant)
+    """Over whole turns: what swings with the turn has another mean over a part of one."""
+    began = _angle(plant)
+    plant.run(_ticks(1.0))
+    turn_s = 2 * math.pi / abs(_angle(plant) - began)
+    left = total = _ticks(max(1, round(seconds / turn_s)) * turn_s)
+    began, bounds = _angle(plant), 0.0
+    while left > 0:
+        trace = plant.run(min(left, _ticks(CHUNK_S)), 1)[1]
+        bounds += float(trace[:, AT["torque_bound"]].sum())
+        left -= len(trace)
+    return way * (_angle(plant) - began) / (total * TICK_S), bounds / total, _ripple(plant)
+
+
+def _angle(plant: Plant) -> float:
+    return float(plant.state()["s"][5])
 
 
 def _ripple(plant: Plant) -> float:
