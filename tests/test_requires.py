@@ -77,7 +77,9 @@ def without_capability(rig: RigFile, key: str) -> RigFile:
     for part in (table, *path)[:-1]:
         holder = holder.get(part) or {}
     last = (table, *path)[-1]
-    if isinstance(holder[last], str):
+    if path[:-1] == ["contact"]:  # the bit of one ring
+        del holder[last]
+    elif isinstance(holder[last], str):
         holder[last] = ""
         if table == "model":
             del holder[last]

@@ -143,7 +143,7 @@ def test_plans_limits_and_the_simulated_machine_are_checked_too(
     for said in (
         "plans.amb-calibraton: found amb-calibraton; expected the name of a procedure, such as amb-calibration",
         "angels: found 9",
-        "simulation.machine: found 'mine'; expected one of tsbs, amb5dof",
+        "simulation.machine: found 'mine'; expected one of tsbs, tsbs6, amb5dof",
         "geometry.clearance.value",
         "limits.spindown.B.at.bias",
     ):

@@ -12,7 +12,7 @@ from bench.rigfile import RigFile, load_rig
 from sim_backend.machines.twin import truth_sensitivity, truth_whirl
 from sim_backend.machines.twin.quiet import Sight, floating
 from sim_backend.machines.twin.truth_step import steps_asked
-from sim_backend.motion import StepsAsked, drag
+from sim_backend.motion import DragAsked, StepsAsked, drag
 from sim_backend.truth import draw
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -130,7 +130,7 @@ def test_a_shaft_that_turns_freely_is_stopped_by_the_drag_that_is_told() -> None
     """J w' = -B w - T_c from 300 rad/s, in closed form: w = (w_0 + T_c/B) exp(-B t/J) - T_c/B."""
     rig = rig_of(SPINDLE)
     drawn = draw(rig, 1)
-    told = drag(drawn)
+    told = drag(drawn, DragAsked(0.0, 0.0, False))
     plant = floating(rig, drawn, {name: p.default for name, p in rig.parameters.items()}, 300.0, 0.5).plant
     plant.drive(None)
     begin = float(plant.state()["s"][11])
