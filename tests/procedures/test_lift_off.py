@@ -177,11 +177,13 @@ def test_a_motor_that_lifts_at_zero_is_told_and_gives_no_angle(known: dict[str, 
     ("defect", "code"),
     [
         ({"contact_silent": 1.0}, "contact-silent"),
-        ({"factor_segment_max": 0.97}, "not-at-limit"),
+        ({"factor_segment_max": 0.995}, "not-at-limit"),
+        ({"weight_left_kg": 0.05}, "load-changed"),
         ({"gamma_zero": 0.012}, "zero-moved"),
         pytest.param({"factor_gamma_slew": 1.05}, "lift-disagrees", marks=pytest.mark.long),
         pytest.param({"position_gain_yo": 1.2}, "ring-elsewhere", marks=pytest.mark.long),
         pytest.param({"weight_left_kg": 1.2}, "load-unexpected", marks=pytest.mark.long),
+        pytest.param({"geometry.clearance": 430e-6}, "sideways-limit", marks=pytest.mark.long),
     ],
 )
 def test_a_defect_is_named_and_does_not_pass(
