@@ -15,8 +15,9 @@ from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, Influence
 from sim_backend.truth import draw
 
-RIG, SEED = "tsbs12-close", 3
-PLAN = ("repeats=2", "dwell_s=0.3", "rate_rad_s=5e-3", "raise_s=0.4", "settle_s=0.3", "average_s=0.3", "rest_s=0.3")
+RIG, SEED = "tsbs12-close", 10
+PLAN = ("repeats=2", "dwell_s=0.3", "rate_rad_s=5e-3", "raise_s=0.4", "settle_s=0.3", "average_s=0.3", "rest_s=0.3",
+        "gamma_max_rad=0.035", "back_rad_s=0.1")  # fmt: skip
 
 
 def adopt(folder: Path, true: Mapping[str, float]) -> None:
@@ -38,7 +39,11 @@ def adopt(folder: Path, true: Mapping[str, float]) -> None:
             name: Estimate.of(value, Influence(f"{procedure}/{name}", name, 1e-3 * abs(value), "1", "B", "normal"))
             for name, value in values.items()
         }
-        store.adopt(Calibration(procedure, estimates, run_id=procedure, rig=RIG, uut=rig.uut.serial, backend="served"))
+        store.adopt(
+            Calibration(
+                procedure, estimates, run_id=procedure, rig=RIG, uut=rig.uut.serial, backend="served", sha256="0" * 64
+            )
+        )
 
 
 @pytest.mark.long
