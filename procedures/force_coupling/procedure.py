@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.roles import STATUS
+from bench.uncertainty import Estimate
 from procedures.force_coupling import checks as force_coupling_checks
 from procedures.force_coupling import estimates
 from procedures.force_coupling import figures as drawn
@@ -110,6 +112,12 @@ def measured(a: Analysis) -> Iterator[Measured]:
         yield quantity.measured(a.estimates[quantity.name])
 
 
+def facts(a: Analysis) -> dict[str, Estimate]:
+    """What later procedures use: the three, and at home (0) the current that carries the outboard end."""
+    found = {m.quantity.name: m.estimate for m in measured(a)}
+    return {**found, "carried@0": replace(a.estimates["carried@0"], unit="A")}
+
+
 def read(recording: Recording[Plan]) -> StepTable[Phase]:
     """The steps, in time order."""
     return read_steps(recording, Phase)
@@ -182,6 +190,7 @@ procedure = Procedure(
     acquire=acquire,
     evaluate=evaluate,
     measured=measured,
+    facts=facts,
     figures=figures,
     requires=requires,
     check=check,
