@@ -113,9 +113,9 @@ def measured(a: Analysis) -> Iterator[Measured]:
 
 
 def facts(a: Analysis) -> dict[str, Estimate]:
-    """What later procedures use: the three, and at home (0) the current that carries the outboard end."""
+    """What later procedures use: the three, and the force that carries the outboard end over alpha_d, A."""
     found = {m.quantity.name: m.estimate for m in measured(a)}
-    return {**found, "carried@0": replace(a.estimates["carried@0"], unit="A")}
+    return {**found, "carried": replace(a.estimates["carried"], unit="A")}
 
 
 def read(recording: Recording[Plan]) -> StepTable[Phase]:

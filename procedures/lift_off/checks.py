@@ -23,7 +23,7 @@ from procedures.shared import signals
 Array = npt.NDArray[np.float64]
 FATAL = ("stuck-channel", "contact-silent")
 SURE = 1.5  # times the interval: three standard uncertainties
-LOAD = 0.2  # of the weight's share: force constant 3 %, magnetic centre 20 um or 10 %
+LOAD = 0.25  # of the weight's share: magnetic centre and probe's zero, 30 um times 280 N/mm, 17 %; force constant 3 %; rest
 MORE_A = 0.015  # 0.2 N: 20 g on the hook, or 0.5 um of the probe's zero
 FULL = 0.98  # of the limit: where i_x gets there nothing is left to balance what goes sideways
 LIGHT_N = 1.0  # an end that presses less on its ring is taken up by the start's own motion

@@ -204,7 +204,7 @@ def _carried(
         return {"carried": fit.load(p, currents, y, x)[1] / fit.constants(p)[0]}
 
     found = {"carried": _in("A", linearised(model, inputs)["carried"])}
-    before = recording.calibration("force-coupling").values.get("carried@0")
+    before = recording.calibration("force-coupling").values.get("carried")
     return found if before is None else {**found, "more": _in("A", found["carried"] - before)}
 
 
