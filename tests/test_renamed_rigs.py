@@ -22,6 +22,7 @@ from bench.rigfile import RigFile, load_rig
 from bench.rigfile.capabilities import parameters_named
 from bench.rigfile.supports import radial_supports
 from bench.samples import SampleBlock
+from benchmarks.moved import QUICK
 from drivers.controller import Controller
 from sim_backend.endpoint import SimulatedRig
 from sim_backend.truth import draw
@@ -141,10 +142,11 @@ def told(run: Simulated) -> tuple[dict[tuple[str, str], tuple[float, float]], li
 
 
 def chained(rig: str, folder: Path, procedures: Sequence[str]) -> Iterator[tuple[str, Simulated]]:
-    """Runs one after the other, each with the calibrations by those before it."""
+    """Runs one after the other by short plans, each with the calibrations by those before it."""
     known: dict[str, Calibration] = {}
     for procedure in procedures:
-        run = simulated_run(procedure, rig, 1, {}, folder / f"{procedure}.mcap", calibrations=known)
+        plan, path = QUICK.get(procedure, {}), folder / f"{procedure}.mcap"
+        run = simulated_run(procedure, rig, 1, plan, path, calibrations=known)
         yield procedure, run
         known[procedure] = run.calibration()
 
