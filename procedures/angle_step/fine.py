@@ -35,7 +35,7 @@ class Raised:
 class Fine:
     """Of one step, `forward` or back: rise and settling s (`settling_off` s, what a twentieth of a count in the band does to
     it), overshoot as a share; peaks off the sensors' zero at the outboard sensor and at the motor, m, with their directions,
-    and by how much noise has `raised` each; `slopes` rad/s at 10 and 90 %."""
+    and by how much noise has `raised` each; `slopes` rad/s at 10 and 90 %; `saturated` s."""
 
     forward: bool
     rise: float
@@ -49,6 +49,7 @@ class Fine:
     raised: Raised
     motor_raised: Raised
     slopes: tuple[float, float]
+    saturated: float
 
 
 def fine(done: Done, swing: Swing, settling: float, band: float, count: float, noise: float) -> Fine | None:
@@ -75,6 +76,7 @@ def fine(done: Done, swing: Swing, settling: float, band: float, count: float, n
         peak=peak, peak_motor=motor, towards=towards, towards_motor=towards_motor, raised=raised,
         motor_raised=motor_raised,
         slopes=(_slope(found, low), _slope(found, high)),
+        saturated=swing.cut,
     )  # fmt: skip
 
 
