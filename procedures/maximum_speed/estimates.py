@@ -213,14 +213,14 @@ def _scatter(sharing: str, shared: Shared) -> dict[str, Estimate]:
 
 
 def _ripples(of: Mapping[str, Shared]) -> dict[str, Estimate]:
-    """The speed's ripple by sharing, mean of the windows."""
+    """The speed's ripple by sharing, mean of both directions."""
     out = {}
     for s, name in ((HALF, "half"), (OP, "op")):
-        ways = [np.array([w.turning.ripple for w in of[s].windows if w.direction == d]) for d in (1, -1)]
-        dof = sum(len(x) - 1 for x in ways)
-        spread = math.sqrt(sum(float(((x - x.mean()) ** 2).sum()) for x in ways) / dof)
-        u = spread * math.sqrt(sum(1 / len(x) for x in ways)) / 2
+        ways = [fit.ripple(np.array([w.turning.swings for w in of[s].windows if w.direction == d])) for d in (1, -1)]
+        dof = sum(len(x.off) - 1 for x in ways)
+        spread = math.sqrt(sum(float((x.off**2).sum()) for x in ways) / dof)
+        u = spread * math.sqrt(sum(1 / len(x.off) for x in ways)) / 2
         scatter = Influence(id=f"scatter/ripple/{s}", name="scatter of the runs", u=u, unit="rad/s", kind="A",
                             distribution="normal", dof=float(dof))  # fmt: skip
-        out[f"ripple_{name}"] = Estimate.of(float(np.mean([x.mean() for x in ways])), scatter)
+        out[f"ripple_{name}"] = Estimate.of(float(np.mean([x.size for x in ways])), scatter)
     return out

@@ -21,7 +21,8 @@ from sim_backend.motion import Numbers, SpeedsAsked
 
 Array = npt.NDArray[np.float64]
 OTHER_NOISE = 0x5EED
-SETTLE_S, CHUNK_S, RIPPLE_S = 6.0, 2.0, 4.0
+SETTLE_S, CHUNK_S = 6.0, 2.0
+SPARSE = 10  # ticks from one angle to the next, of which the ripple is made
 AT = {name: k for k, name in enumerate(TRACE)}
 
 
@@ -78,25 +79,23 @@ def _watched(plant: Plant, seconds: float, way: int) -> tuple[float, float, floa
     plant.run(_ticks(1.0))
     turn_s = 2 * math.pi / abs(_angle(plant) - began)
     left = total = _ticks(max(1, round(seconds / turn_s)) * turn_s)
-    began, bounds = _angle(plant), 0.0
+    began, bounds, angles = _angle(plant), 0.0, []
     while left > 0:
         trace = plant.run(min(left, _ticks(CHUNK_S)), 1)[1]
         bounds += float(trace[:, AT["torque_bound"]].sum())
+        angles.append(trace[::SPARSE, AT["angle"]])
         left -= len(trace)
-    return way * (_angle(plant) - began) / (total * TICK_S), bounds / total, _ripple(plant)
+    return way * (_angle(plant) - began) / (total * TICK_S), bounds / total, _ripple(np.concatenate(angles))
 
 
 def _angle(plant: Plant) -> float:
     return float(plant.state()["s"][5])
 
 
-def _ripple(plant: Plant) -> float:
-    rows = []
-    for _ in range(round(RIPPLE_S / 1e-3)):
-        plant.run(_ticks(1e-3))
-        s = plant.state()["s"]
-        rows.append((s[5], s[11]))
-    angle, speed = np.array(rows).T
-    orders = [w(n * angle) for n in range(1, 5) for w in (np.cos, np.sin)]
-    terms: Array = np.linalg.lstsq(np.column_stack([np.ones_like(angle), *orders]), speed, rcond=None)[0][1:]
+def _ripple(read: Array) -> float:
+    """Of angles as they are read, counts and all: in 40 s these leave less than 1 mrad/s."""
+    angle = np.unwrap(read)
+    rates, between = np.diff(angle) / (SPARSE * TICK_S), (angle[1:] + angle[:-1]) / 2
+    orders = [w(n * between) for n in range(1, 5) for w in (np.cos, np.sin)]
+    terms: Array = np.linalg.lstsq(np.column_stack([np.ones_like(between), *orders]), rates, rcond=None)[0][1:]
     return math.sqrt(float((terms**2).sum()) / 2)
