@@ -61,7 +61,7 @@ def chain() -> Mapping[str, Measured]:
     found: dict[str, Measured] = {}
     with tempfile.TemporaryDirectory() as folder:
         for step in chosen.step:
-            path = Path(folder) / f"{step.procedure}.mcap"
+            path = Path(folder) / f"{len(facts)}-{step.procedure}.mcap"
             done = simulated_run(
                 step.procedure, chosen.rig, SEED, {**step.plan, **step.virtual_plan}, path, truth, facts
             )
@@ -70,6 +70,8 @@ def chain() -> Mapping[str, Measured]:
                 raise SystemExit(f"{step.procedure}: {wrong}")
             facts[step.procedure] = done.calibration()
             found |= {m.quantity.name: m for m in done.results if isinstance(m, Measured) and not m.where}
+            if all(p.quantity in found for p in PRINTED):
+                break
     return found
 
 

@@ -56,9 +56,7 @@ class Controller:
         self.cut_ns = 0  # the most that a step lacked of its telemetry when it was left
         self.companions: list[Callable[[], None]] = []  # polled with it: other devices of the rig
         self._orders = Orders(rig, self.requests, session, self.envelope, lambda: self.mode, self._wait)
-        self.rotation = Turning(
-            rig, self._orders, self.telemetry, self.clock, base.now_ns, lambda: self.sight.speeds_rad_s()
-        )
+        self.rotation = Turning(rig, self._orders, self.telemetry, self.clock, base.now_ns, self.sight.speeds_rad_s)
         self.capture: ControllerCapture | None = None
         if rig.capture is not None:
             upload = Upload(rig, link, self.requests, self.clock)
@@ -231,10 +229,7 @@ class Controller:
         self.watch.condition.commanded(name)
         fit = {"LAND": "LEVITATED", "DISABLE": "READY"}.get(name)
         try:
-            if fit is None:
-                self._orders.command(name)
-            else:
-                self._orders.command(name, lambda: self.mode == fit and (slow or self._slow)())
+            self._orders.command(name, lambda: fit is None or (self.mode == fit and (slow or self._slow)()))
         except Refused:
             self.watch.condition.refused()
             raise

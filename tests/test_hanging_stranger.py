@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from bench.analysis.vectors import Vectors
+from bench.cli.loading import load_procedure
 from bench.cli.motion_truth import truth_of_motion
 from bench.cli.virtual import Simulated, simulated_run
 from bench.findings import Effect, Finding
@@ -39,7 +40,11 @@ def found(run: Simulated) -> set[str]:
 def off(run: Simulated) -> dict[str, float]:
     """Errors over U, of what there is a truth of."""
     truth = truth_of_motion(run)
-    told = {f"{m.quantity.name}@{m.where}": m.estimate for m in run.results if isinstance(m, Measured)}
+    told = {
+        f"{m.quantity.name}@{m.where}" if m.where else m.quantity.name: m.estimate
+        for m in run.results
+        if isinstance(m, Measured)
+    }
     return {key: (e.value - truth[key]) / interval(e).U for key, e in told.items() if key in truth}
 
 
@@ -97,7 +102,7 @@ def test_set_points_are_followed_and_act_when_they_are_written(tmp_path: Path) -
 
 @pytest.mark.long
 @pytest.mark.timeout(900)
-@pytest.mark.parametrize("procedure", ["run-up", "coast-down", "balance", "spindown"])
+@pytest.mark.parametrize("procedure", ["coast-down", "spindown"])
 def test_nothing_is_wrong_with_a_sound_stranger(procedure: str, tmp_path: Path) -> None:
     run = ran(procedure, tmp_path)
     assert found(run) == set()
@@ -105,6 +110,14 @@ def test_nothing_is_wrong_with_a_sound_stranger(procedure: str, tmp_path: Path) 
     assert errors
     assert math.sqrt(sum(x * x for x in errors.values()) / len(errors)) < 1
     assert max(map(abs, errors.values())) < 2
+
+
+def test_runout_of_more_probes_than_balancing_reads_is_refused_by_name() -> None:
+    """A controller that holds the shaft by all six takes the runout of the third plane for a motion: of 2.3 um there
+    `balance` made 4.5 g mm that are not there, 7 U (seed 2)."""
+    procedure = load_procedure("balance")
+    assert [line for line in procedure.lacking(load_rig(RIG)) if "from the side" in line] != []
+    assert procedure.lacking(load_rig("amb5dof")) == ()
 
 
 def test_a_step_by_telemetry_this_slow_says_so(tmp_path: Path) -> None:

@@ -122,20 +122,24 @@ def _load_numerics() -> None:
         importlib.import_module(f"scipy.{name}")
 
 
-def remedy(request: Request, need: Need) -> str:
-    """The command lines that make the calibration that a run lacks."""
+def assignments_of(need: Need) -> list[str]:
+    """What a plan of the needed procedure takes, KEY=VALUE, so that its calibration holds at the settings that are needed."""
     fields = load_procedure(need.procedure).plan.model_fields
-    settings = [
+    return [
         f"{name}={str(bool(value)).lower() if fields[name].annotation is bool else number(value)}"
         for name, value in need.settings.items()
         if name in fields
     ]
+
+
+def remedy(request: Request, need: Need) -> str:
+    """The command lines that make the calibration that a run lacks."""
     words = ["bench", "run", need.procedure, "--rig", request.rig]
     if request.backend == "live":
         words += ["--backend", "live"]
     which = (("--seed", request.seed), ("--visit", request.visit))
     words += [word for option, given in which if given is not None for word in (option, str(given))]
-    more = (("--link", request.links), ("--truth", request.truth), ("--plan", settings))
+    more = (("--link", request.links), ("--truth", request.truth), ("--plan", assignments_of(need)))
     words += [word for option, values in more for value in values for word in (option, value)]
     where = [] if request.calibrations is None else ["--calibrations", str(request.calibrations)]
     run, adopt = shlex.join([*words, *where]), shlex.join(["bench", "adopt", "RUN", *where])

@@ -11,10 +11,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from bench import catalogue
-from bench.calibration import Need, number, settings_differ
+from bench.calibration import Need, settings_differ
 from bench.calibration.store import Store, machine
 from bench.cli.adopt import adopt
-from bench.cli.compose import Request, planned
+from bench.cli.compose import Request, assignments_of, planned
 from bench.cli.loading import load_procedure
 from bench.cli.run import execute
 from bench.errors import BenchError, ConfigError
@@ -117,9 +117,7 @@ class Suite:
         return not settings_differ(done.holds_for(plan), need.settings)
 
     def _make(self, procedure: str, need: Need) -> None:
-        fields = load_procedure(need.procedure).plan.model_fields
-        settings = [f"{name}={number(value)}" for name, value in need.settings.items() if name in fields]
-        result = self._run(self._request(need.procedure, settings))
+        result = self._run(self._request(need.procedure, assignments_of(need)))
         if not result.outcome.sound:
             raise _not_calibrated(procedure, need.procedure, result)
         if not self.adopting:

@@ -74,6 +74,15 @@ def missing(rig: RigFile) -> Iterator[str]:
             if getattr(plane, key) is None:
                 yield f"balancing.{name}.{key}: found none; expected what is not known of a weight that is fixed there"
     yield from _one_sided(rig)
+    yield from _more_probes(rig)
+
+
+def _more_probes(rig: RigFile) -> Iterator[str]:
+    """Runout counts as an unbalance by what the loop sees of it (`runout.as_unbalance`): the four probes that are read here."""
+    aside = [name for name, probe in rig.probes.items() if probe.direction is not None]
+    if len(aside) > 4:
+        found = f"probes: found {len(aside)} that look at the shaft from the side"
+        yield f"{found}; this procedure takes four: the controller may hold the shaft by the runout of the others"
 
 
 def _one_sided(rig: RigFile) -> Iterator[str]:

@@ -40,7 +40,8 @@ class Analysis:
 
 
 def evaluate(recording: Recording[Any], data: StepTable[Phase], count_rad: float) -> Analysis:
-    """Fit, and the three estimates by name (with `winding`, the x winding's constant over the y winding's)."""
+    """Fit, and the three estimates by name; `winding`, the x winding's constant over the y winding's, and `carried` A, the
+    force that holds the outboard end up at home over the y winding's constant, beside them."""
     inputs = fit_inputs(recording)
     machine = conventions(recording.rig)
     y, x = (data.stack(machine.positions_of(f"{axis}i", f"{axis}o")) for axis in "yx")
@@ -91,6 +92,7 @@ def outputs(fit: CouplingFit, p: dict[str, float]) -> dict[str, float]:
         "alpha_c": p["alpha_d"] * fit.term("w") / math.cos(p["pole_pairs"] * zero),
         "gamma_0": zero,
         "winding": fit.term("a"),
+        "carried": -fit.term("f_y"),
     }
 
 
@@ -103,6 +105,7 @@ def _gradients(fit: CouplingFit, p: dict[str, float]) -> dict[str, Array]:
         "alpha_ratio": -unit[0] / w**2,
         "alpha_c": alpha_c * unit[0] + alpha_c * w * math.tan(turn) * p["pole_pairs"] * unit[2],
         "winding": unit[1],
+        "carried": -unit[4],
     }
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.roles import STATUS
+from bench.uncertainty import Estimate
 from procedures.force_coupling import checks as force_coupling_checks
 from procedures.force_coupling import estimates
 from procedures.force_coupling import figures as drawn
@@ -110,6 +112,12 @@ def measured(a: Analysis) -> Iterator[Measured]:
         yield quantity.measured(a.estimates[quantity.name])
 
 
+def facts(a: Analysis) -> dict[str, Estimate]:
+    """What later procedures use: the three, and the force that carries the outboard end over alpha_d, A."""
+    found = {m.quantity.name: m.estimate for m in measured(a)}
+    return {**found, "carried": replace(a.estimates["carried"], unit="A")}
+
+
 def read(recording: Recording[Plan]) -> StepTable[Phase]:
     """The steps, in time order."""
     return read_steps(recording, Phase)
@@ -182,6 +190,7 @@ procedure = Procedure(
     acquire=acquire,
     evaluate=evaluate,
     measured=measured,
+    facts=facts,
     figures=figures,
     requires=requires,
     check=check,

@@ -17,7 +17,7 @@ from procedures.lift_off.steps import Dwell, Held, Ramped, Rest, read_ramps, rea
 from procedures.servomotor.conventions import Servomotor, conventions
 from procedures.servomotor.parameters import stated
 from procedures.shared.certificates import certified, certified_gain, certified_sensors
-from procedures.shared.gradients import by_inputs
+from procedures.shared.gradients import by_inputs, linearised
 from procedures.shared.step_table import StepTable
 
 Array = npt.NDArray[np.float64]
@@ -36,9 +36,9 @@ WRITE_S = 0.005  # within which a write of gamma acts: a request and its reply
 
 @dataclass(frozen=True)
 class Analysis:
-    """`gammas` (N, 2) rad of the lifts below and above, by repeat; `estimates` by quantity, `zero_predicted` rad and `surplus`
-    N beside them; `lifted` are indices into the ramps' samples, None where the end stayed down. `limit_A` is what i_y took on
-    the ring."""
+    """`gammas` (N, 2) rad of the lifts below and above, by repeat; `estimates` by quantity, `zero_predicted` rad, `surplus` N,
+    `carried` A and by how much that is `more` than in force-coupling beside them; `lifted` are indices into the ramps' samples,
+    None where the end stayed down. `limit_A` is what i_y took on the ring."""
 
     rest: StepTable[Rest]
     dwells: StepTable[Dwell] | None
@@ -66,7 +66,7 @@ def evaluate(recording: Recording[Plan], rest: StepTable[Rest]) -> Analysis:
     limit, slope = math.nan, math.nan
     if held is not None:
         predicted, limit, slope = _predicted(machine, low, dwells, held, inputs)
-        found |= predicted
+        found |= predicted | _carried(recording, machine, held, inputs)
     if len(gammas):
         values = {name: e.value for name, e in inputs.items()}
         turned = float(gammas[:, 1].mean() - gammas[:, 0].mean()) / 2 + values["gamma_0"]
@@ -189,6 +189,23 @@ def _predicted(
     if slope > 0:  # else it lifts at once, and there is no angle
         told |= {name: _in("rad", found[name] + away[name] * (1 / slope)) for name in found if name != "surplus"}
     return told, limit(values), slope
+
+
+def _carried(
+    recording: Recording[Plan], machine: Servomotor, held: StepTable[Held], inputs: dict[str, Estimate]
+) -> dict[str, Estimate]:
+    """`carried` A: the force that holds the end up at the probes' zero over the y winding's constant, freed of the zero of the
+    commutation; `more`: than force-coupling found, where that was handed on. Sensors and force constant cancel in it."""
+    above = {axis: float(held.mean[channel].mean()) for axis, channel in machine.positions.items()}
+    currents = held.stack(machine.segments).mean(axis=1)
+
+    def model(p: Mapping[str, float]) -> dict[str, float]:
+        y, x = (fit.at_motor(p, a, above[f"{a}i"], above[f"{a}o"]) for a in "yx")
+        return {"carried": fit.load(p, currents, y, x)[1] / fit.constants(p)[0]}
+
+    found = {"carried": _in("A", linearised(model, inputs)["carried"])}
+    before = recording.calibration("force-coupling").values.get("carried")
+    return found if before is None else {**found, "more": _in("A", found["carried"] - before)}
 
 
 def _in(unit: str, e: Estimate) -> Estimate:

@@ -25,6 +25,8 @@ class Plan(BenchPlan):
     confirm_s: float = Field(0.3, ge=0.1)  # without contact, until it is a lift
     average_s: float = Field(0.5, ge=0.1)  # with the end up, at gamma 0
     max_depth_m: float = Field(5e-6, gt=0)  # by which the end may move on its ring
-    limit_share: float = Field(0.98, gt=0, le=1)  # of the motor's limit that i_y takes at least on the ring
+    limit_share: float = Field(
+        0.999, gt=0, lt=1
+    )  # of its limit that i_y takes at least on the ring, and as much above at most
     max_angle_rad: float = Field(6e-3, gt=0)  # by which the rotor may be off its home angle: four counts of the encoder
     max_lost: float = Field(1e-3, ge=0)  # share of a step's samples

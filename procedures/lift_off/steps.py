@@ -19,6 +19,7 @@ from procedures.servomotor.steps import POSITIONS
 from procedures.shared.step_table import Kind, Labels, StepTable, tabulate
 
 Array = npt.NDArray[np.float64]
+LAST = 100  # samples just before a lift
 BEFORE_S = (0.2, 0.06)  # before a lift: at 0.2 deg/s the ring carries 0.5 N still, and is pressed by some 10 nm
 
 
@@ -83,7 +84,7 @@ class Ramped:
 
     def turned(self, lifted: int) -> float:
         """How far the rotor is off its home angle just before the lift, rad, as its encoder reads."""
-        return float(self.angle[max(0, lifted - 100) : lifted].mean())
+        return float(self.angle[max(0, lifted - LAST) : lifted].mean())
 
     def before(self, lifted: int, early_s: tuple[float, float] = BEFORE_S) -> dict[str, float]:
         """Mean readings by axis from so long until so long before the sample of the lift: the ring carries hardly anything

@@ -103,7 +103,7 @@ def test_a_plan_that_would_trip_is_refused_by_the_facts(tmp_path: Path) -> None:
     facts = facts_of("tsbs12", 1, tmp_path)
     b, torque = facts["spindown"].values["B"].value, facts["torque-constant"].values
     with pytest.raises(ConfigError, match="nothing was started") as refused:
-        run(tmp_path, "tsbs12", 1, facts)
+        run(tmp_path, "tsbs12", 1, facts, limit_A=10.0, carried_A=0.0, bias_A=3.0)
     said = re.search(r"turn the rotor at (\d+) rad/s \(\d+ r/min\); the guard is 70 rad/s", str(refused.value))
     assert said is not None
     speed = (10 - (48.55 / 12.1 + 0.2) / 2) * torque["alpha_tau"].value * math.cos(8 * torque["gamma_0t"].value) / b
@@ -118,7 +118,7 @@ def test_a_plan_that_would_trip_is_refused_by_the_facts(tmp_path: Path) -> None:
 def test_a_drawn_machine_that_the_plan_is_none_for_is_counted_apart(tmp_path: Path) -> None:
     """Its own facts say so: no value is missing, and the rig stands among those that cannot do the run."""
     task = RigTask("tsbs12", load_rig("tsbs12").digest, (), {}, "none", str(tmp_path))
-    step = StepTask("maximum-speed", {"limit_A": 5.0}, (), False)
+    step = StepTask("maximum-speed", {"limit_A": 5.0, "carried_A": 0.0, "bias_A": 3.0}, (), False)
     done = simulated_step(task, step, 1, tmp_path / "recording.mcap", facts_of("tsbs12", 1, tmp_path))
     assert "turn the rotor at" in done.cannot
     assert list(done.results) == []

@@ -1,4 +1,4 @@
-"""The motor's law: torque at its limit (T 6.7.2), lift by the motor (T 6.7.2), load balancing (T 6.7.3)."""
+"""The motor's law: torque at its limit (T 6.7.2), lift by the motor (T 6.7.3, Fig. 6.11), load balancing (T 6.7.3)."""
 
 from __future__ import annotations
 
