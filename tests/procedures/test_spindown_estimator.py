@@ -140,13 +140,10 @@ def test_what_is_no_run_down_is_told(w: np.ndarray) -> None:
 
 
 def test_a_run_down_begins_where_the_motor_lets_go() -> None:
-    """4 A until 0.137 s, and 0.3 ms of the amplifiers; beside a drive there is no torque current, and nothing is cut off. One
-    that stays is not let go: the whole step shows it."""
-    noise = np.random.default_rng(3).normal(0, 1e-3, 600)
-    torque = np.where(np.arange(600) < 137, 4.0, 4.0 * np.exp(-(np.arange(600) - 137) / 0.3)) + noise
+    """4 A until 0.137 s, and 0.3 ms of the amplifiers. Gains are written one after the other: what is gone for 5 ms only is not
+    let go. A step that begins at the release is whole, and so is one in which the motor never lets go: it shows that."""
+    noise, k = np.random.default_rng(3).normal(0, 1e-3, 600), np.arange(600)
+    torque = np.where(k < 137, 4.0, 4.0 * np.exp(-(k - 137) / 0.3)) + noise
     assert released(torque) == released(-torque) == 138
-    swung = np.where(
-        (np.arange(600) > 60) & (np.arange(600) < 65), 0.0, torque
-    )  # gains are written one after the other
-    assert released(swung) == 138
-    assert released(0.004 + noise) == released(np.full(600, 4.0)) == released(np.zeros(0)) == 0
+    assert released(np.where((k > 60) & (k < 66), 0.0, torque)) == 138
+    assert released(0.01 + 5 * noise) == released(np.full(600, 4.0)) == released(np.zeros(0)) == 0
