@@ -181,7 +181,10 @@ def _inputs(
     segments = {f"m{k}": c for k, c in enumerate(conventions(rig).segments)}
     out |= certified_sensors(rig, {**segments, **{c: c for c in held}})
     for s, shared in of.items():
-        out |= _scatter(s, shared)
+        out |= scatter(s, shared.seen)
+        count = Influence(id=f"encoder/{s}", name="counts of the encoder", u=shared.counts, unit="rad/s", kind="B",
+                          distribution="normal")  # fmt: skip
+        out[f"speed_{s}"] = out[f"speed_{s}"] + Estimate.of(0.0, count)
     return out
 
 
@@ -189,13 +192,11 @@ def _one_of(t: Toleranced, identity: str, k: int) -> Estimate:
     return certified(identity, t, f"torque of segment {k + 1} over the mean of the four")
 
 
-def _scatter(sharing: str, shared: Shared) -> dict[str, Estimate]:
-    """Zeros with what the means of speed, torque current and bound over both directions scatter by, together; each direction by
-    itself: where i_x is nothing one way noise takes several times as much torque as where it is not."""
-    count = Influence(id=f"encoder/{sharing}", name="counts of the encoder", u=shared.counts,
-                      unit="rad/s", kind="B", distribution="normal")  # fmt: skip
-    out = [Estimate.of(0.0, count), *(Estimate.exact(0.0) for _ in range(SEEN - 1))]
-    for way, seen in shared.seen.items():
+def scatter(sharing: str, of: Mapping[str, Array]) -> dict[str, Estimate]:
+    """Zeros with what the means of speed, torque current and bound over both directions scatter by, together: `of` each
+    direction by itself, (n, 3) less their mean. Where i_x is nothing one way noise takes several times as much torque."""
+    out = [Estimate.exact(0.0)] * SEEN
+    for way, seen in of.items():
         n = len(seen)
         covariance = seen.T @ seen / (n - 1) / n / 4
         scale = np.sqrt(np.diag(covariance))

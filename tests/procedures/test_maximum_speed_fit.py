@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from bench.errors import AnalysisError
+from bench.uncertainty import interval
 from procedures.maximum_speed import fit
+from procedures.maximum_speed.estimates import scatter
 from procedures.maximum_speed.plan import HALF, OP, Plan
 from procedures.maximum_speed.running import order
 
@@ -69,6 +71,18 @@ def test_noise_does_not_lengthen_the_ripple_and_its_interval_holds_it() -> None:
     assert np.mean(sizes) == pytest.approx(0.1, abs=0.003)
     assert np.mean(inside) == pytest.approx(0.95, abs=0.02)
     assert fit.ripple(np.zeros((3, 8))).size == 0
+
+
+def test_directions_of_different_scatter_have_an_interval_of_their_own_degrees_of_freedom() -> None:
+    """Backward five times forward, five windows each: nearly all of it has four degrees of freedom, and with the eight of both
+    together 0.93 of the intervals would hold."""
+    noise, inside = np.random.default_rng(11), []
+    for _ in range(1500):
+        rows = {"forward": 1e-3 * noise.standard_normal((5, 3)), "backward": 5e-3 * noise.standard_normal((5, 3))}
+        mean = sum(r.mean(axis=0) for r in rows.values()) / 2
+        found = scatter(HALF, {way: r - r.mean(axis=0) for way, r in rows.items()})
+        inside.append([abs(m) < interval(e).U for m, e in zip(mean, found.values(), strict=True)])
+    assert np.mean(inside, axis=0) == pytest.approx(0.95, abs=0.017)
 
 
 def test_a_rotor_that_hardly_turns_has_no_speed() -> None:

@@ -83,11 +83,15 @@ def _drifted(p: PlantParams, at_s: float) -> PlantParams:
 
 
 def _watched(plant: Plant, seconds: float, way: int) -> tuple[float, float, float]:
-    """Over whole turns: what swings with the turn has another mean over a part of one, by 1e-5 of it even in 40 s."""
     traces = [plant.run(_ticks(CHUNK_S), 1)[1][:, READ] for _ in range(max(1, round(seconds / CHUNK_S)))]
     angle, bounds = np.concatenate(traces).T
-    turned = way * np.unwrap(angle)
-    turned -= turned[0]
+    return over_turns(way * np.unwrap(angle), bounds)
+
+
+def over_turns(angle: Array, bounds: Array) -> tuple[float, float, float]:
+    """Speed rad/s, mean bound A and ripple rad/s of unwrapped angles as they are read, growing, and bounds (n,) of every tick;
+    over whole turns: what swings with the turn has another mean over a part of one, by 1e-5 of it even in 40 s."""
+    turned = angle - angle[0]
     last = int(np.searchsorted(turned, 2 * math.pi * max(1, int(turned[-1] / (2 * math.pi)))))
     speed, ripple = _turning(turned[:last:SPARSE])
     return speed, float(bounds[:last].mean()), ripple
