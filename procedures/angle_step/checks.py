@@ -55,6 +55,10 @@ def of_responses(results: Mapping[Case, Result], plan: Plan, loops: Mapping[Case
         if not all(math.isfinite(r.settling) for r in result.responses):
             yield Finding("not-settled", "the angle is still outside its band at the end of the record: record longer, or look "
                           "at the integrator and at what holds the rotor.", case.where, Effect.ERROR)  # fmt: skip
+        if result.short:
+            yield Finding("capture-short", f"{result.short} of {len(result.responses)} captures end before their step has "
+                          "settled: it is read from telemetry, and currents are left out. The reference was written late, or "
+                          "the loop is slow.", case.where, Effect.INDETERMINATE, (f"@{case.where}",))  # fmt: skip
     yield from _holding(results, plan)
     for case, result in results.items():
         demand = CARRIES_A + kick_A(loops[case], case.size)

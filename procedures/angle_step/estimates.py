@@ -24,11 +24,12 @@ Moved = TypeVar("Moved", Response, Fine)
 @dataclass(frozen=True)
 class Result:
     """Responses of the moves of one case, and the mean of each quantity with its influences; no settling time where the angle
-    does not settle."""
+    does not settle. How many captures are `short`: they end before their step does."""
 
     case: Case
     responses: tuple[Response, ...]
     estimates: Mapping[str, Estimate]
+    short: int = 0
 
 
 def by_case(moves: list[Done], rig: RigFile, band: float, count_rad: float) -> dict[Case, Result]:
@@ -46,23 +47,26 @@ def by_case(moves: list[Done], rig: RigFile, band: float, count_rad: float) -> d
         within = max(band * case.size, 2 * count_rad)
         responses = tuple(response(d.move, within) for d in done)
         found = _estimates(case, responses, gains, share, count_rad, period)
-        if all(d.swing is not None for d in done):
-            found |= _captured(case, done, responses, rig, within, count_rad)
-        out[case] = Result(case, responses, found)
+        captured, short = _captured(case, done, responses, rig, within, count_rad)
+        out[case] = Result(case, responses, found | captured, short)
     return out
 
 
 def _captured(
     case: Case, done: Sequence[Done], responses: Sequence[Response], rig: RigFile, band_rad: float, count: float
-) -> dict[str, Estimate]:
-    """What captures add, and what they say better where each step is over within its own."""
+) -> tuple[dict[str, Estimate], int]:
+    """What captures add and what they say better, where each step is over within its own; and how many are too short."""
     machine, swings = conventions(rig), [d.swing for d in done if d.swing is not None]
+    if not swings:
+        return {}, 0
     tick = float(swings[0].t[1])
-    out = bounds.estimates(case.where, swings, rig, case.allocation == "priority")
     noise = bounds.noise_of(rig, tuple(machine.positions.values()), 1 / tick)
-    shown = [fine(d, s, band_rad, count, noise) for d, s in zip(done, swings, strict=True)]
+    shown = [fine(d, s, r.settling, band_rad, count, noise) for d, s, r in zip(done, swings, responses, strict=True)]
     whole = [f for f in shown if f is not None]
-    return out | (_finer(case, whole, responses, rig, count, tick) if len(whole) == len(done) else {})
+    if len(whole) < len(shown):
+        return {}, len(shown) - len(whole)
+    out = bounds.estimates(case.where, swings, rig, case.allocation == "priority")
+    return out | _finer(case, whole, responses, rig, count, tick), 0
 
 
 def _period(moves: list[Done]) -> float:

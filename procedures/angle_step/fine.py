@@ -44,15 +44,17 @@ class Fine:
     slopes: tuple[float, float]
 
 
-def fine(done: Done, swing: Swing, band: float, count: float, noise: float) -> Fine | None:
-    """Of a captured step; None where it is not over within the capture. `band` rad of settling, `noise` m of a reading."""
+def fine(done: Done, swing: Swing, settling: float, band: float, count: float, noise: float) -> Fine | None:
+    """Of a captured step; None where the capture ends before the angle has settled, `settling` s after the answer by telemetry:
+    its reference was written late, or its loop is slow. `band` rad of settling, `noise` m of a reading."""
     size, way = abs(done.move.step), math.copysign(1.0, done.move.step)
     start = done.target - done.move.step
     turns = 2 * np.pi * np.round((swing.angle[0] - start) / (2 * np.pi))
     found = edges(swing.t, swing.angle, count).since(start + turns, way)
     low, high = found.crossing(0.1 * size), found.crossing(0.9 * size)
-    if not math.isfinite(high) or not len(tops := [y for _, y in found.turning()]):
+    if not math.isfinite(high) or _answer(swing) + settling + SWING_S > swing.t[-1]:
         return None
+    tops = [y for _, y in found.turning()]
     settled, *others = (found.last_outside(size, band + k * count) for k in (0.0, -BETWEEN, BETWEEN, -TOUCHES, TOUCHES))
     near, touching = others[:2], [s for s in others[2:] if abs(s - settled) > SWING_S]
     peak, towards, floor = _peak(swing.orbit, noise)
@@ -62,7 +64,7 @@ def fine(done: Done, swing: Swing, band: float, count: float, noise: float) -> F
         rise=high - low,
         settling=settled - _answer(swing),
         settling_off=max(abs(s - settled) for s in (*near, *touching)),
-        overshoot=max(max(tops) / size - 1, 0.0),
+        overshoot=max(max(tops, default=0.0) / size - 1, 0.0),
         peak=peak, peak_motor=motor, towards=towards, towards_motor=towards_motor, floor=floor, motor_floor=motor_floor,
         slopes=(_slope(found, low), _slope(found, high)),
     )  # fmt: skip

@@ -19,6 +19,7 @@ from procedures.servomotor.parameters import parameter
 
 Array = npt.NDArray[np.float64]
 STEP = "move"
+ANSWERS = 0.5  # of its greatest: the torque current that answers a step
 ANSWER_A = 0.2  # of torque current: well above its noise, a twentieth of the smallest sensible step's
 
 
@@ -90,7 +91,7 @@ def _read(recording: Recording[Any], step: Step, machine: Servomotor, share: flo
                if e["name"] == reference and step.start_ns <= e["t_ns"] < step.end_ns]  # fmt: skip
     if not written:
         raise AnalysisError(f"move {dict(step.labels)}: found no write of the angle's reference within it")
-    rest = data["t_ns"] < written[-1]
+    rest = standing(data["t_ns"], _torque(data, machine), written[-1])
     if rest.sum() < 20 or (~rest).sum() < 100:
         raise AnalysisError(f"move {dict(step.labels)}: found {int(rest.sum())} samples before it and "
                             f"{int((~rest).sum())} after; expected at least 20 and 100")  # fmt: skip
@@ -110,15 +111,37 @@ def _read(recording: Recording[Any], step: Step, machine: Servomotor, share: flo
     )
 
 
+def standing(t_ns: npt.NDArray[np.int64], torque: Array, written_ns: int) -> npt.NDArray[np.bool_]:
+    """Which samples (n,) are of the standstill before a step, by the host's time `written_ns` of the reference's write and the
+    torque current (n,) A.
+
+    Sample times are the device's ticks with one offset. A device that falls behind the host's clock has answered by its own
+    samples before the host wrote: there the standstill ends with the answer, which is beyond half of what the step takes.
+    """
+    rest: npt.NDArray[np.bool_] = t_ns < written_ns
+    size = np.abs(torque - np.median(torque))
+    loud = int(np.argmax(size > ANSWERS * size.max()))
+    if not rest[loud] or size[loud] <= ANSWER_A:
+        return rest
+    first = loud - 1 if loud and size[loud - 1] > ANSWER_A else loud  # a mean may hold a part of the answer
+    return np.arange(len(rest)) < first
+
+
+def _torque(data: Mapping[str, npt.NDArray[Any]], machine: Servomotor) -> Array:
+    """The torque current (n,) A, as its sensors read."""
+    mean: Array = np.array([data[c] for c in machine.segments])[:: machine.components].mean(axis=0)
+    return mean
+
+
 def _move(
     data: Mapping[str, npt.NDArray[Any]], rest: npt.NDArray[np.bool_], labels: Mapping[str, Any], machine: Servomotor,
     share: float,
 ) -> Move:  # fmt: skip
     step = float(labels["step_rad"])
     segments = np.array([data[c] for c in machine.segments])
-    torque = segments[:: machine.components].mean(axis=0)
-    standing = float(torque[rest].mean())
-    answers = np.flatnonzero(~rest & (np.abs(torque - standing) > ANSWER_A))
+    torque = _torque(data, machine)
+    level = float(torque[rest].mean())
+    answers = np.flatnonzero(~rest & (np.abs(torque - level) > ANSWER_A))
     if not len(answers):
         raise AnalysisError(f"a step of {np.degrees(step):.2f} deg: the torque current never answers")
     first = max(int(answers[0]) - 1, int(np.flatnonzero(~rest)[0]))

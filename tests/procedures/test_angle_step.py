@@ -23,6 +23,7 @@ from procedures.angle_step import response
 from procedures.angle_step.plan import Plan
 from procedures.angle_step.procedure import CAPTURED, check, planned, procedure, step_count
 from procedures.angle_step.response import Loop, Move
+from procedures.angle_step.steps import standing
 from reports.figures import draw as draw_figure
 from sim_backend.truth import draw
 
@@ -57,6 +58,22 @@ def test_at_12_degrees_priority_leaves_less_than_a_third_of_the_excursion(tmp_pa
     for figure in drawn:
         draw_figure(figure)
     assert len(recording.all_steps()) == step_count(recording.plan)
+
+
+@pytest.mark.parametrize("behind_ms", [0, 20, 120])
+def test_a_device_that_falls_behind_the_host_does_not_hide_its_step_in_the_standstill(behind_ms: int) -> None:
+    """The answer begins at sample 100, a part of it in that mean; the write is stamped later by what the device is behind. A
+    count of the encoder at rest (0.8 A in a mean) is no answer."""
+    torque = np.zeros(900)
+    torque[40], torque[100], torque[101:110] = 0.8, 0.5, 8.0
+    rest = standing(np.arange(900, dtype=np.int64) * 1_000_000, torque, (100 + behind_ms) * 1_000_000)
+    np.testing.assert_array_equal(rest, np.arange(900) < 100)
+
+
+def test_a_step_that_is_answered_after_its_write_keeps_the_writes_time() -> None:
+    torque = np.where(np.arange(900) < 103, 0.0, 8.0)
+    torque[130:] = 0.0
+    assert int(standing(np.arange(900, dtype=np.int64) * 1_000_000, torque, 100_000_000).sum()) == 100
 
 
 @pytest.mark.parametrize("seed", [2, pytest.param(3, marks=pytest.mark.long)])

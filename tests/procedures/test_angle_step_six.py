@@ -18,10 +18,11 @@ from bench.findings import Effect, Finding
 from bench.procedure import Measured
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate
-from procedures.angle_step import bounds
+from procedures.angle_step import bounds, checks, estimates
 from procedures.angle_step.bounds import Swing
 from procedures.angle_step.plan import Plan
-from procedures.angle_step.procedure import planned, procedure
+from procedures.angle_step.procedure import _loop, planned, procedure
+from procedures.angle_step.steps import Done, read_moves
 from procedures.servomotor import leaning, wiring
 from procedures.servomotor.conventions import conventions
 from procedures.servomotor.parameters import parameter
@@ -66,6 +67,34 @@ def test_at_15_degrees_priority_leaves_a_tenth_at_most(nominal_run: Simulated) -
         assert abs(amplitude.value - 10) < 2.6 * amplitude.u + 0.01
     assert abs(measured["bound_excess", "priority, 15°, 1000 Hz"].value) < 2e-6
     assert ("bound_excess", "static, 15°, 1000 Hz") not in measured
+
+
+def late(done: Done, seconds: float) -> Done:
+    """As captured if the reference had been written later by so much."""
+    assert done.swing is not None
+    n = len(done.swing.t) - round(seconds * 1e4)
+    held = {k: np.concatenate([np.full(len(v) - n, v[0]), v[:n]]) for k, v in done.swing.asked.items()}
+    first = {name: getattr(done.swing, name) for name in ("angle", "orbit", "motor", "vectors")}
+    rest = {
+        k: np.concatenate([np.repeat(v[..., :1], len(done.swing.t) - n, -1), v[..., :n]], -1) for k, v in first.items()
+    }
+    return replace(done, swing=replace(done.swing, asked=held, **rest))
+
+
+@pytest.mark.parametrize(("seconds", "short"), [(0.0, 0), (0.15, 0), (0.3, 2), (0.39, 2)])
+def test_a_capture_that_ends_before_its_step_is_said(nominal_run: Simulated, seconds: float, short: int) -> None:
+    """A write that is delayed: from where the angle has not settled within 0.4 s, means of 1 ms are told, and no currents."""
+    rig, plan = nominal_run.recording.rig, nominal_run.recording.plan
+    moves = [d if k % 2 else late(d, seconds) for k, d in enumerate(read_moves(nominal_run.recording))]
+    found = estimates.by_case(moves, rig, plan.band, 2 * math.pi / plan.encoder_counts)
+    assert [r.short for r in found.values()] == [short] * 2
+    said = [
+        f
+        for f in checks.of_responses(found, plan, {c: _loop(rig, plan, c) for c in found})
+        if f.code == "capture-short"
+    ]
+    assert [f.effect for f in said] == [Effect.INDETERMINATE] * (2 if short else 0)
+    assert all(("amplitude" in r.estimates) is not bool(short) for r in found.values())
 
 
 def test_its_figures_show_torque_within_its_bound(nominal_run: Simulated) -> None:

@@ -86,7 +86,7 @@ def run_chain(asked: Asked, directory: CampaignDirectory, progress: Progress) ->
     """
     passed = _passed(asked, directory)
     left = [s for s in asked.steps if s.number not in passed]
-    counts = [s.procedure.step_count(s.plan) for s in left]
+    counts = [s.procedure.steps(asked.rig, s.plan) for s in left]
     progress.total(sum(counts) if all(counts) else 0)
     found: list[Done] = []
     with Supervisor().watching() as supervisor:
