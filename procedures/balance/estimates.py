@@ -30,6 +30,7 @@ from procedures.synchronous.dwells import Dwell
 from procedures.synchronous.estimates import ForceBalance
 from procedures.synchronous.orbit_frame import covariance
 from procedures.synchronous.runout import Stand, Turning
+from procedures.synchronous.unexplained import allowed
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -251,6 +252,8 @@ def influences(balance: Balanced, rig: RigFile) -> dict[tuple[str, str], tuple[E
 
 def balance_forces(d: Dwell, off: Complex, rig: RigFile, known: Known) -> ForceBalance:
     """The balance of forces of one dwell, with a runout (4,) m and what is known of the bearings."""
-    read, s = read_dwell(d), Stand.of({name: e.value for name, e in bearings.collect_inputs(rig, known).items()})
+    read, inputs = read_dwell(d), bearings.collect_inputs(rig, known)
+    s = Stand.of({name: e.value for name, e in inputs.items()})
     _, misfit = runout.unbalances(s, read.turning, off)
-    return ForceBalance(d, misfit, carried(rig, s, read.means))
+    may = allowed(misfit, d, inputs, [Estimate.exact(float(x), "m") for x in off.view(float)])
+    return ForceBalance(d, misfit, may, carried(rig, s, read.means))

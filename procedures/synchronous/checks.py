@@ -20,7 +20,6 @@ from procedures.synchronous.estimates import ForceBalance, Results
 from procedures.synchronous.fitting import PER_TURN, too_fast
 
 HELD = 8  # samples in a row at an extreme: a probe that clips
-UNEXPLAINED = 0.1  # share of the forces that two unbalances leave over: a channel is not what its name says
 CARRIED = 0.5  # of the share of the weight that an axis should carry: how far its coils may be off
 BESIDE = 0.05  # of the least clearance: motion that does not turn with the shaft
 CHANGED, CHANGED_M = 0.1, 0.3e-6  # of the vector, and at least: a repeat that differs by more
@@ -126,7 +125,7 @@ def slow_roll(dwells: Sequence[Dwell], speeds: Sequence[float], runout: tuple[st
 
 def of_results(results: Results) -> Iterator[Finding]:
     """Do forces and motion agree? Is a repeat the same? Then zones and the runout, as notes."""
-    forces = [ForceBalance(r.dwell, r.misfit, r.carried) for r in results.dwells]
+    forces = [r.forces for r in results.dwells]
     yield from channels(forces)
     yield from weight(forces)
     yield from _beside(results)
@@ -139,10 +138,10 @@ def of_results(results: Results) -> Iterator[Finding]:
 
 def channels(dwells: Sequence[ForceBalance]) -> Iterator[Finding]:
     """Two unbalances must explain motion less control forces of all four axes: they do not where channels are exchanged."""
-    worst = max(dwells, key=lambda r: r.misfit)
-    if worst.misfit > UNEXPLAINED:
+    worst = max(dwells, key=lambda r: r.misfit / r.allowed)
+    if worst.misfit > worst.allowed:
         text = (f"no unbalance in the two planes explains motion and currents: {worst.misfit:.0%} of the forces are left over "
-                f"({UNEXPLAINED:.0%} is allowed). Suspect the polarity of a probe, exchanged planes or axes, or "
+                f"({worst.allowed:.0%} is allowed). Suspect the polarity of a probe, exchanged planes or axes, or "
                 "exchanged coils.")  # fmt: skip
         yield Finding("forces-disagree", text, worst.dwell.where, Effect.ERROR)
 

@@ -23,6 +23,7 @@ from procedures.synchronous.dwells import ORDERS, SLOW, Dwell
 from procedures.synchronous.nonsynchronous import beside_orders, folds
 from procedures.synchronous.orbit_frame import as_orbit, covariance, squared, squaring
 from procedures.synchronous.runout import Stand, Turning
+from procedures.synchronous.unexplained import allowed
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -42,18 +43,19 @@ class Runout:
 
 @dataclass(frozen=True)
 class ForceBalance:
-    """Of a `dwell`: `misfit`, the share of the forces that two unbalances do not explain; `carried` (4,), of what each axis
-    should carry of the weight."""
+    """Of a `dwell`: `misfit`, the share of the forces that two unbalances do not explain, and what is `allowed` of it;
+    `carried` (4,), of what each axis should carry of the weight."""
 
     dwell: Dwell
     misfit: float
+    allowed: float
     carried: Array
 
 
 @dataclass(frozen=True)
 class Result:
     """A dwell's estimates by name and place; `vectors` of the shaft's centre with their joint covariance; orbits by plane;
-    `misfit`, the share of the forces that two unbalances do not explain; `carried` (4,), of what each axis should carry;
+    `forces`, what their balance says;
     `beside` (2,) m, by plane what does not turn with the shaft; `folded`, the order that shows as order 1, and how much (4,) m.
     """
 
@@ -61,8 +63,7 @@ class Result:
     vectors: Vectors
     orbits: Mapping[str, Ellipse]
     centres: Mapping[str, tuple[float, float]]
-    misfit: float
-    carried: Array
+    forces: ForceBalance
     unbalance: Complex
     beside: Array
     folded: tuple[int, Array]
@@ -194,7 +195,9 @@ def _result(
         out["d_max_share", plane] = _unit(far / clearance, "1")
         out |= coil_peaks.peaks(d, inputs, plane, rig)
     out["reading", ""] = _reading(d, inputs)
-    return Result(d, vectors, orbits, centres, misfit, carried(rig, nominal, d.means), u, beside, folded, out)
+    may = allowed(misfit, d, inputs, runouts[1.0].parts)
+    forces = ForceBalance(d, misfit, may, carried(rig, nominal, d.means))
+    return Result(d, vectors, orbits, centres, forces, u, beside, folded, out)
 
 
 def _shaft(d: Dwell, inputs: Mapping[str, Estimate], off: Runout, order: float, rig: RigFile) -> list[Estimate]:

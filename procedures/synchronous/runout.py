@@ -153,6 +153,15 @@ def control_forces(s: Stand, turning: Turning) -> tuple[Complex, Array]:
 def unbalances(s: Stand, turning: Turning, runout: Complex, more: Complex | None = None) -> tuple[Complex, float]:
     """Unbalance (2,) kg m, e^(j angle from the mark), by least squares; the share of the forces that it leaves unexplained.
     `more` (4,) N at the AMBs, beyond the slopes."""
+    u, left, whole = left_over(s, turning, runout, more)
+    return u, float(np.linalg.norm(left)) / whole
+
+
+def left_over(
+    s: Stand, turning: Turning, runout: Complex, more: Complex | None = None
+) -> tuple[Complex, Complex, float]:
+    """Unbalance (2,) kg m as `unbalances` gives it; what it leaves of forces and moments (4,) N, moments at arms of 0.1 m; the
+    size of the forces, N."""
     force, k_x = control_forces(s, turning)
     if more is not None:
         force = force + s.axes.T @ more
@@ -160,17 +169,16 @@ def unbalances(s: Stand, turning: Turning, runout: Complex, more: Complex | None
     q = np.linalg.solve(s.probes, turning.vectors[:4] / s.gain - runout)
     inertial = impedance(s, k_x, w, w) @ q
     u, left = equivalent(s, inertial - force, w)
-    whole = float(np.linalg.norm(SCALE * inertial) + np.linalg.norm(SCALE * force))
-    return u, left / whole
+    return u, left, float(np.linalg.norm(SCALE * inertial) + np.linalg.norm(SCALE * force))
 
 
-def equivalent(s: Stand, force: Complex, w: float) -> tuple[Complex, float]:
-    """Unbalance (2,) kg m in the planes that at `w` rad/s acts as forces and moments (4,), by least squares; the norm of what
-    it leaves over, moments at arms of 0.1 m."""
+def equivalent(s: Stand, force: Complex, w: float) -> tuple[Complex, Complex]:
+    """Unbalance (2,) kg m in the planes that at `w` rad/s acts as forces and moments (4,), by least squares; what it leaves
+    over of them (4,) N, moments at arms of 0.1 m."""
     acts = w**2 * arms(s.l_iu, s.l_ou).T @ waves(s)
     target = SCALE * force
     u = np.linalg.lstsq(SCALE[:, None] * acts, target, rcond=None)[0]
-    return np.asarray(u, np.complex128), float(np.linalg.norm(target - SCALE[:, None] * acts @ u))
+    return np.asarray(u, np.complex128), np.asarray(target - SCALE[:, None] * acts @ u, np.complex128)
 
 
 def as_unbalance(s: Stand, means: Array, runout: Complex, w: float) -> Complex:

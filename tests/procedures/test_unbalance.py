@@ -35,6 +35,7 @@ from procedures.synchronous.bearings import describe
 from procedures.synchronous.coil_peaks import blocks, find_uncertified
 from procedures.synchronous.dwells import SLOW, read_dwells
 from procedures.synchronous.estimates import Results
+from procedures.synchronous.unexplained import UNEXPLAINED
 from procedures.unbalance import procedure as unbalance
 from procedures.unbalance.procedure import check
 from reports.figures import draw as draw_figure
@@ -382,7 +383,7 @@ def test_runout_by_forces_is_exact_on_its_own_model() -> None:
     assert found.misfit < 1e-6
     swapped = made[1].vectors.copy()
     swapped[:4] = swapped[[2, 3, 0, 1]]
-    assert runout.unbalances(stand, runout.Turning(1000.0, means, swapped), found.runout[1.0])[1] > checks.UNEXPLAINED
+    assert runout.unbalances(stand, runout.Turning(1000.0, means, swapped), found.runout[1.0])[1] > UNEXPLAINED
 
 
 def test_orders_mix_in_forces_that_are_not_linear() -> None:
