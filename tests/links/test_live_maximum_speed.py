@@ -54,7 +54,7 @@ def ran(folder: Path, rig: processes.Served, procedure: str, plan: dict[str, Any
     }
 
 
-@pytest.mark.long
+@pytest.mark.links
 @pytest.mark.timeout(500)
 def test_the_maximum_speed_of_a_served_rig_is_what_its_own_run_downs_expect(tmp_path: Path) -> None:
     store = Store.of(load_rig(RIG), None, tmp_path / "known")
