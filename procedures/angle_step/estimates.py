@@ -12,7 +12,7 @@ import numpy as np
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
 from procedures.angle_step import bounds, steps
-from procedures.angle_step.fine import BETWEEN, Fine, fine
+from procedures.angle_step.fine import BETWEEN, Fine, Raised, fine
 from procedures.angle_step.response import Response, response
 from procedures.angle_step.steps import Case, Done
 from procedures.servomotor.conventions import conventions
@@ -119,10 +119,8 @@ def _finer(
     between = _bound(f"edges/{where}", "encoder between its counts", BETWEEN * count, "rad")
     sampling = _bound(f"ticks/{where}", "sampling", tick / 2, "s")
     band = _bound(f"edges/settling/{where}", "encoder between its counts", max(x.settling_off for x in r), "s")
-    raised = {"outboard": float(np.mean([x.floor for x in r])), "motor": float(np.mean([x.motor_floor for x in r]))}
-    noise, motor_noise = (
-        _bound(f"raised/{plane}/{where}", "noise in a peak", by / 2, "m") - by for plane, by in raised.items()
-    )
+    noise = _lowered(f"raised/outboard/{where}", [x.raised for x in r])
+    motor_noise = _lowered(f"raised/motor/{where}", [x.motor_raised for x in r])
     outboard = _gained(r, lambda x: x.towards, lambda x: x.peak, {"xo": 1.0, "yo": 1.0}, gains)
     rest = _each_way(f"standstill/{where}", "m", [x.rest_peak for x in still], ways)
     planes = {"xo": share, "yo": share, "xi": 1 - share, "yi": 1 - share}
@@ -163,6 +161,12 @@ def _bound(identity: str, name: str, half: float, unit: str) -> Estimate:
         id=identity, name=name, u=half / math.sqrt(3), unit=unit, kind="B", distribution="rectangular"
     )
     return Estimate.of(0.0, influence)
+
+
+def _lowered(identity: str, raised: Sequence[Raised]) -> Estimate:
+    """What noise adds to the peaks of a case, taken off, m."""
+    by, off = (float(np.mean(values)) for values in ([x.by for x in raised], [x.off for x in raised]))
+    return _bound(identity, "noise in a peak", off, "m") - by
 
 
 def _gained(

@@ -15,20 +15,27 @@ from procedures.angle_step.steps import Done
 
 Array = npt.NDArray[np.float64]
 SMOOTH = 21  # ticks of the parabola that a peak is read from: keeps 99 % of one that lasts 4 ms, noise falls to a third
-DRAWS = 8  # of noise
+WIDER = (61, 41)  # ticks of the curves that drawn noise is put on: one that counts, one to compare it with
+DRAWS = 16  # of noise
 ANSWERS = 0.5  # of its greatest: the torque current that answers a step
 BETWEEN = 0.05  # of a count: what a turning point between two edges may be off (0.02 rms of drawn swings)
-TOUCHES, SWING_S = (
-    0.5,
-    5e-3,
-)  # of a count: a swing that ends so near the band leaves it or does not, which is a jump of more
+TOUCHES = 0.5  # of a count: a swing that ends so near the band leaves it or does not,
+SWING_S = 5e-3  # which is a jump of more
+
+
+@dataclass(frozen=True)
+class Raised:
+    """`by` how much noise raises a peak, m, and how far `off` that may be, m: what a curve that is smoothed less says."""
+
+    by: float
+    off: float
 
 
 @dataclass(frozen=True)
 class Fine:
     """Of one step, `forward` or back: rise and settling s (`settling_off` s, what a twentieth of a count in the band does to
     it), overshoot as a share; peaks off the sensors' zero at the outboard sensor and at the motor, m, with their directions,
-    and by how much noise raises each; `slopes` rad/s at 10 and 90 %."""
+    and by how much noise has `raised` each; `slopes` rad/s at 10 and 90 %."""
 
     forward: bool
     rise: float
@@ -39,8 +46,8 @@ class Fine:
     peak_motor: float
     towards: Array
     towards_motor: Array
-    floor: float
-    motor_floor: float
+    raised: Raised
+    motor_raised: Raised
     slopes: tuple[float, float]
 
 
@@ -57,15 +64,16 @@ def fine(done: Done, swing: Swing, settling: float, band: float, count: float, n
     tops = [y for _, y in found.turning()]
     settled, *others = (found.last_outside(size, band + k * count) for k in (0.0, -BETWEEN, BETWEEN, -TOUCHES, TOUCHES))
     near, touching = others[:2], [s for s in others[2:] if abs(s - settled) > SWING_S]
-    peak, towards, floor = _peak(swing.orbit, noise)
-    motor, towards_motor, motor_floor = _peak(swing.motor, noise * swing.spread)
+    peak, towards, raised = _peak(swing.orbit, noise)
+    motor, towards_motor, motor_raised = _peak(swing.motor, noise * swing.spread)
     return Fine(
         forward=way > 0,
         rise=high - low,
         settling=settled - _answer(swing),
         settling_off=max(abs(s - settled) for s in (*near, *touching)),
         overshoot=max(max(tops, default=0.0) / size - 1, 0.0),
-        peak=peak, peak_motor=motor, towards=towards, towards_motor=towards_motor, floor=floor, motor_floor=motor_floor,
+        peak=peak, peak_motor=motor, towards=towards, towards_motor=towards_motor, raised=raised,
+        motor_raised=motor_raised,
         slopes=(_slope(found, low), _slope(found, high)),
     )  # fmt: skip
 
@@ -76,21 +84,31 @@ def _answer(swing: Swing) -> float:
     return float(swing.t[int(np.argmax(torque > ANSWERS * torque.max()))])
 
 
-def _peak(orbit: Array, noise: float) -> tuple[float, Array, float]:
-    """Greatest distance off centre, m, its direction (2,), and by how much noise raises it. Of n values alike it is raised by
-    their noise times a number of n alone: with three times the variance on top, which doubles the noise, by as much again."""
+def _smoothed(x: Array, ticks: int = SMOOTH) -> Array:
+    """(..., n): each sample from a parabola through its neighbours (Savitzky and Golay)."""
     from scipy import signal
 
-    def smoothed(x: Array) -> Array:
-        out: Array = signal.savgol_filter(x, SMOOTH, 2, axis=-1)
-        return out
+    out: Array = signal.savgol_filter(x, ticks, 2, axis=-1)
+    return out
 
-    smooth = smoothed(orbit)
+
+def _peak(orbit: Array, noise: float) -> tuple[float, Array, Raised]:
+    """Greatest distance off centre, m, its direction (2,), and by how much noise raises it: as much as drawn noise
+    raises the peak of a smoother curve. Noise on top of what was read would say too much, for where a peak is round, the first
+    noise raises it less than what follows. Each draw is taken with both signs: their mean is nothing at any tick."""
+    smooth = _smoothed(orbit)
     radius = np.hypot(*smooth)
     k = int(np.argmax(radius))
-    again = smoothed(np.random.default_rng(0).normal(0.0, math.sqrt(3) * noise, (DRAWS, *orbit.shape))) + smooth
-    raised = float(np.hypot(again[:, 0], again[:, 1]).max(axis=1).mean() - radius[k])
-    return float(radius[k]), smooth[:, k] / max(float(radius[k]), 1e-300), max(raised, 0.0)
+    half = _smoothed(np.random.default_rng(0).normal(0.0, noise, (DRAWS // 2, *orbit.shape)))
+    drawn = np.concatenate([half, -half])
+    by, other = (_raised(_smoothed(orbit, ticks), drawn) for ticks in WIDER)
+    return float(radius[k]), smooth[:, k] / max(float(radius[k]), 1e-300), Raised(by, abs(by - other))
+
+
+def _raised(curve: Array, drawn: Array) -> float:
+    """By how much noise `drawn` (DRAWS, 2, n) m raises the greatest distance of a curve (2, n) m off centre, in the mean."""
+    again = curve + drawn
+    return float(np.hypot(again[:, 0], again[:, 1]).max(axis=1).mean() - np.hypot(*curve).max())
 
 
 def _slope(found: Edges, at: float) -> float:
