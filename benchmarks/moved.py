@@ -69,6 +69,7 @@ class Moved:
     """What became of one number: `shift` of the result that moved most, in U of the run with nothing moved; `own`, the moved
     run's error of it in its own U; `end` caught, nothing, budget, listed or FAILS."""
 
+    rig: str
     procedure: str
     name: str
     end: str
@@ -186,7 +187,7 @@ def moved(procedure: str, rig: str, seed: int, names: Mapping[str, float], folde
     for name, value in names.items():
         shifts = rigs[seed].shifts(name, value, folder)
         if isinstance(shifts, str):
-            yield Moved(procedure, name, "caught", 0.0, "", shifts)
+            yield Moved(rig, procedure, name, "caught", 0.0, "", shifts)
             continue
         ends = {key: rigs[seed].end(name, key, *both) for key, both in shifts.items()}
         worst = max(shifts, key=lambda key: (ORDER.index(ends[key]), shifts[key]), default="")
@@ -201,7 +202,7 @@ def moved(procedure: str, rig: str, seed: int, names: Mapping[str, float], folde
                 several += [again[worst]] if not isinstance(again, str) and worst in again else []
             shift, own = (math.sqrt(sum(x * x for x in xs) / len(xs)) for xs in zip(*several, strict=True))
             end = "FAILS" if shift > MATTERS and own > ITSELF else "nothing"
-        yield Moved(procedure, name, end, round(shift, 2), worst, "", round(own, 2))
+        yield Moved(rig, procedure, name, end, round(shift, 2), worst, "", round(own, 2))
 
 
 def main() -> int:
@@ -209,24 +210,27 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("procedures", nargs="*")
     parser.add_argument(
-        "--all", type=Path, metavar="FILE", help="every procedure; the lines go to a file and are not done again"
+        "--all",
+        type=Path,
+        metavar="FILE",
+        help="every procedure, or those named; the lines go to a file, what it has is not done again",
     )
     parser.add_argument("--seed", type=int, default=5)
     asked = parser.parse_args()
     lines = [json.loads(x) for x in asked.all.read_text().splitlines()] if asked.all and asked.all.exists() else []
-    done = {(e["procedure"], e["name"]) for e in lines}
+    done = {(e["rig"], e["procedure"], e["name"]) for e in lines}
     for rig, procedures in RIGS.items():
         for procedure in procedures:
-            if asked.all is None and procedure not in asked.procedures:
+            if procedure not in asked.procedures and (asked.procedures or not asked.all):
                 continue
             load(procedure)
-            left = {n: v for n, v in numbers(load_rig(rig)).items() if (procedure, n) not in done}
+            left = {n: v for n, v in numbers(load_rig(rig)).items() if (rig, procedure, n) not in done}
             with tempfile.TemporaryDirectory() as folder:
                 for line in moved(procedure, rig, asked.seed, left, Path(folder)) if left else ():
                     lines.append(asdict(line))
                     print(
-                        f"{line.procedure:18} {line.name:34} {line.end:8} {line.shift:6.2f} U, {line.own:5.2f} of its own "
-                        f"{line.result} {line.told[:90]}"
+                        f"{line.rig:13} {line.procedure:18} {line.name:34} {line.end:8} {line.shift:6.2f} U, "
+                        f"{line.own:5.2f} of its own {line.result} {line.told[:90]}"
                     )
                     if asked.all:
                         with asked.all.open("a", encoding="utf-8") as out:
@@ -234,8 +238,8 @@ def main() -> int:
     failed = [e for e in lines if e["end"] == "FAILS"]
     for e in failed:
         print(
-            f"FAILS: {e['procedure']} {e['name']}: {e['result']} by {e['shift']} U, {e.get('own', 0.0)} of its own, quiet, in "
-            "no budget and in no list"
+            f"FAILS: {e['rig']} {e['procedure']} {e['name']}: {e['result']} by {e['shift']} U, {e.get('own', 0.0)} of its own, "
+            "quiet, in no budget and in no list"
         )
     return 1 if failed else 0
 

@@ -148,14 +148,15 @@ class DragAsked:
 class SpeedsAsked:
     """Runs at the torque limit: `settings` as those of steps; what is written `before` them, one after the other, once the
     shaft is held; the parameters that choose each of the `sharings`, by its name; the speed reference that guards them, rad/s;
-    for how long each is watched in each direction, s, and how long the current sensors have drifted by then, s."""
+    for how long each is watched in each direction, s, and by direction, 1 and -1, how long the current sensors have drifted by
+    then, s."""
 
     settings: Numbers
     before: Sequence[Numbers]
     sharings: Mapping[str, Numbers]
     guard: float
     seconds: float
-    at_s: float
+    at_s: Mapping[int, float]
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from sim_backend.motion import Whirl
 
 MARGIN_POINTS = 20000
-TOP_S = 40.0  # for which a speed is watched in each direction
+TOP_S, TOP_TIMES = 40.0, 12.0  # a speed is watched in each direction: so long, or so many times as long as in the run
 Found = Iterator[tuple[str, str, float]]  # name, where, value in SI
 
 
@@ -329,9 +329,14 @@ def _maximum_speed(done: Simulated) -> Found:
          **chosen(rig, "torque", "limit")},
     )  # fmt: skip
     sharings = {s: chosen(rig, "sharing", s) for s in (HALF, OP)}
-    begun = [step.start_ns - done.recording.start_ns for step in done.recording.steps(RUN)]
-    at_s = 1e-9 * sum(begun) / max(len(begun), 1)
-    true = of.speeds(rig, done.drawn, SpeedsAsked(_settings(done), before, sharings, guard_of(rig, plan), TOP_S, at_s))
+    begun: dict[int, list[int]] = {1: [], -1: []}
+    for step in done.recording.steps(RUN):
+        begun[int(step.labels["direction"])].append(step.start_ns - done.recording.start_ns)
+    at_s = {way: 1e-9 * sum(found) / max(len(found), 1) for way, found in begun.items()}
+    watched = max(TOP_S, TOP_TIMES * plan.repeats * plan.average_s)
+    true = of.speeds(
+        rig, done.drawn, SpeedsAsked(_settings(done), before, sharings, guard_of(rig, plan), watched, at_s)
+    )
     for s, name in ((HALF, "half"), (OP, "op")):
         yield f"speed_{name}", "", true[s]["speed"]
         yield f"predicted_{name}", "", true[s]["speed"]

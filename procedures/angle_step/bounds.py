@@ -55,6 +55,13 @@ class Swing:
         return bound(self.asked["across"], self.asked["along"], self.limit)
 
     @property
+    def cut(self) -> float:
+        """How long the law asks a segment for more than its limit, s, which its amplifier cuts: q is i_theta +- i_y, d is i_x,
+        T (7.12)."""
+        most = np.hypot(np.abs(self.asked["torque"]) + np.abs(self.asked["along"]), self.asked["across"])
+        return float((most > self.limit + 3 * ROUNDING_A).sum() * self.t[1])
+
+    @property
     def excess(self) -> float:
         """Greatest torque current beyond its bound, A: 0 where it was reached, negative where it never was."""
         return float((np.abs(self.asked["torque"]) - self.bound).max())

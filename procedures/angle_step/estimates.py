@@ -129,6 +129,7 @@ def _finer(
         "rise_time": mean("rise_time", "s", lambda x: x.rise) + sampling + between * (1 / slope),
         "overshoot": mean("overshoot", "1", lambda x: x.overshoot) + between * (1 / case.size),
         "settling_time": mean("settling_time", "s", lambda x: x.settling) + sampling + band,
+        "saturated": mean("saturated", "s", lambda x: x.saturated) + sampling,
         "peak_outboard": mean("peak_outboard", "m", lambda x: x.peak) + outboard + noise,
         "peak_motor": mean("peak_motor", "m", lambda x: x.peak_motor) + motor + motor_noise,
         "excess": mean("excess", "m", lambda x: x.peak) + outboard - rest + noise,

@@ -15,7 +15,8 @@ from procedures.angle_step.steps import Done
 
 Array = npt.NDArray[np.float64]
 SMOOTH = 21  # ticks of the parabola that a peak is read from: keeps 99 % of one that lasts 4 ms, noise falls to a third
-WIDER = (61, 41)  # ticks of the curves that drawn noise is put on: one that counts, one to compare it with
+WIDER = (41, 61, 121, 241, 481)  # ticks of the curves that drawn noise may be put on; of the first only to compare
+KEEPS = 2.0  # times its noise: what a curve that keeps a peak's height may differ there from that of 61 ticks
 DRAWS = 16  # of noise
 ANSWERS = 0.5  # of its greatest: the torque current that answers a step
 BETWEEN = 0.05  # of a count: what a turning point between two edges may be off (0.02 rms of drawn swings)
@@ -35,7 +36,7 @@ class Raised:
 class Fine:
     """Of one step, `forward` or back: rise and settling s (`settling_off` s, what a twentieth of a count in the band does to
     it), overshoot as a share; peaks off the sensors' zero at the outboard sensor and at the motor, m, with their directions,
-    and by how much noise has `raised` each; `slopes` rad/s at 10 and 90 %."""
+    and by how much noise has `raised` each; `slopes` rad/s at 10 and 90 %; `saturated` s."""
 
     forward: bool
     rise: float
@@ -49,6 +50,7 @@ class Fine:
     raised: Raised
     motor_raised: Raised
     slopes: tuple[float, float]
+    saturated: float
 
 
 def fine(done: Done, swing: Swing, settling: float, band: float, count: float, noise: float) -> Fine | None:
@@ -75,6 +77,7 @@ def fine(done: Done, swing: Swing, settling: float, band: float, count: float, n
         peak=peak, peak_motor=motor, towards=towards, towards_motor=towards_motor, raised=raised,
         motor_raised=motor_raised,
         slopes=(_slope(found, low), _slope(found, high)),
+        saturated=swing.cut,
     )  # fmt: skip
 
 
@@ -101,8 +104,25 @@ def _peak(orbit: Array, noise: float) -> tuple[float, Array, Raised]:
     k = int(np.argmax(radius))
     half = _smoothed(np.random.default_rng(0).normal(0.0, noise, (DRAWS // 2, *orbit.shape)))
     drawn = np.concatenate([half, -half])
-    by, other = (_raised(_smoothed(orbit, ticks), drawn) for ticks in WIDER)
+    by, other = (_raised(curve, drawn) for curve in _beneath(orbit, noise))
     return float(radius[k]), smooth[:, k] / max(float(radius[k]), 1e-300), Raised(by, abs(by - other))
+
+
+def _beneath(orbit: Array, noise: float) -> tuple[Array, Array]:
+    """The smoothest curve that keeps the height of the peak, for its own noise is taken for the peak's; and the one before."""
+    before, curve = (_smoothed(orbit, ticks) for ticks in WIDER[:2])
+    loud = (
+        KEEPS * 1.5 * noise / math.sqrt(WIDER[1])
+    )  # the middle of a parabola of n ticks has 9/(4 n) of their variance
+    radius = np.hypot(*curve)
+    for ticks in WIDER[2:]:
+        wider = _smoothed(orbit, ticks)
+        size = np.hypot(*wider)
+        k = int(np.argmax(size))
+        if abs(radius[k] - size[k]) > loud:
+            break
+        before, curve = curve, wider
+    return curve, before
 
 
 def _raised(curve: Array, drawn: Array) -> float:

@@ -30,6 +30,7 @@ from procedures.shared.certificates import certified, certified_sensors
 from procedures.spindown.estimates import drive_drag, held_by, square
 
 Array = npt.NDArray[np.float64]
+WAYS = {1: "forward", -1: "backward"}
 SEEN = 3  # numbers of a window that scatter together: speed, torque current, bound
 UNITS = {"speed": "rad/s", "predicted": "rad/s", "ripple": "rad/s", "ratio": "1", "ratio_predicted": "1",
          "torque_slope": "N m s/rad", "apart": "rad/s", "ratio_apart": "1", "slope_apart": "N m s/rad"}  # fmt: skip
@@ -39,7 +40,7 @@ UNITS = {"speed": "rad/s", "predicted": "rad/s", "ripple": "rad/s", "ratio": "1"
 class Shared:
     """The windows of one sharing: `speed` rad/s, torque current of each segment along the torque (4,) A, `bound` A by the
     formula, `sizes` of i_x, i_y A, `lag` rad of the currents behind the field: means of both directions. `seen` (windows, 3)
-    less its direction's mean: speed, torque current, bound; `counts` rad/s, u of the speed by the encoder."""
+    of each direction less their mean: speed, torque current, bound; `counts` rad/s, u of the speed by the encoder."""
 
     windows: tuple[Window, ...]
     speed: float
@@ -47,7 +48,7 @@ class Shared:
     bound: float
     sizes: Array
     lag: float
-    seen: Array
+    seen: Mapping[str, Array]
     counts: float
 
     @property
@@ -80,7 +81,7 @@ def gathered(windows: list[Window], sharing: str, counts: int) -> Shared:
     if min(len(found) for found in ways.values()) < 2:
         raise AnalysisError(f"{sharing}: found fewer than two runs in a direction (was the run stopped early?)")
     rows = {d: np.array([[w.speed, d * w.segments.mean(), w.told.bound] for w in found]) for d, found in ways.items()}
-    seen = np.concatenate([r - r.mean(axis=0) for r in rows.values()])
+    seen = {WAYS[d]: r - r.mean(axis=0) for d, r in rows.items()}
     means = {d: np.mean([w.segments for w in found], axis=0) for d, found in ways.items()}
     both = (*ways[1], *ways[-1])
     u = math.sqrt(sum(fit.count_u(w.turning, counts) ** 2 for w in both)) / len(both)
@@ -180,7 +181,10 @@ def _inputs(
     segments = {f"m{k}": c for k, c in enumerate(conventions(rig).segments)}
     out |= certified_sensors(rig, {**segments, **{c: c for c in held}})
     for s, shared in of.items():
-        out |= _scatter(s, shared)
+        out |= scatter(s, shared.seen)
+        count = Influence(id=f"encoder/{s}", name="counts of the encoder", u=shared.counts, unit="rad/s", kind="B",
+                          distribution="normal")  # fmt: skip
+        out[f"speed_{s}"] = out[f"speed_{s}"] + Estimate.of(0.0, count)
     return out
 
 
@@ -188,39 +192,37 @@ def _one_of(t: Toleranced, identity: str, k: int) -> Estimate:
     return certified(identity, t, f"torque of segment {k + 1} over the mean of the four")
 
 
-def _scatter(sharing: str, shared: Shared) -> dict[str, Estimate]:
-    """Zeros with what speed, torque current and bound scatter by, together; u of the mean over both directions."""
-    seen, n = shared.seen, len(shared.seen)
-    dof = n - 2
-    covariance = seen.T @ seen / dof / n
-    scale = np.sqrt(np.diag(covariance))
-    scale = np.where(scale > 0, scale, 1.0)
-    root = np.linalg.cholesky(covariance / np.outer(scale, scale) + 1e-9 * np.eye(SEEN)) * scale[:, None]
-    parts = [
-        Influence(id=f"scatter/{sharing}/{k + 1}", name=f"scatter of the runs, {sharing} ({k + 1})", u=1.0, unit="1", kind="A",
-                  distribution="normal", dof=float(dof), source=f"{n} runs, each direction by itself")
-        for k in range(SEEN)
-    ]  # fmt: skip
-    count = Influence(id=f"encoder/{sharing}", name="counts of the encoder", u=shared.counts,
-                      unit="rad/s", kind="B", distribution="normal")  # fmt: skip
-    out = {}
-    for row, name in enumerate(("speed", "current", "bound")):
-        total = Estimate.of(0.0, count) if name == "speed" else Estimate.exact(0.0)
-        for k in range(row + 1):
-            total = total + Estimate.of(0.0, parts[k]) * float(root[row, k])
-        out[f"{name}_{sharing}"] = total
-    return out
+def scatter(sharing: str, of: Mapping[str, Array]) -> dict[str, Estimate]:
+    """Zeros with what the means of speed, torque current and bound over both directions scatter by, together: `of` each
+    direction by itself, (n, 3) less their mean. Where i_x is nothing one way noise takes several times as much torque."""
+    out = [Estimate.exact(0.0)] * SEEN
+    for way, seen in of.items():
+        n = len(seen)
+        covariance = seen.T @ seen / (n - 1) / n / 4
+        scale = np.sqrt(np.diag(covariance))
+        scale = np.where(scale > 0, scale, 1.0)
+        root = np.linalg.cholesky(covariance / np.outer(scale, scale) + 1e-9 * np.eye(SEEN)) * scale[:, None]
+        for k in range(SEEN):
+            part = Influence(
+                id=f"scatter/{sharing}/{way}/{k + 1}", name=f"scatter of the runs, {sharing}, {way} ({k + 1})", u=1.0, unit="1",
+                kind="A", distribution="normal", dof=float(n - 1), source=f"{n} runs",
+            )  # fmt: skip
+            for row in range(k, SEEN):
+                out[row] = out[row] + Estimate.of(0.0, part) * float(root[row, k])
+    return {f"{name}_{sharing}": e for name, e in zip(("speed", "current", "bound"), out, strict=True)}
 
 
 def _ripples(of: Mapping[str, Shared]) -> dict[str, Estimate]:
-    """The speed's ripple by sharing, mean of the windows."""
+    """The speed's ripple by sharing, mean of both directions."""
     out = {}
     for s, name in ((HALF, "half"), (OP, "op")):
-        ways = [np.array([w.turning.ripple for w in of[s].windows if w.direction == d]) for d in (1, -1)]
-        dof = sum(len(x) - 1 for x in ways)
-        spread = math.sqrt(sum(float(((x - x.mean()) ** 2).sum()) for x in ways) / dof)
-        u = spread * math.sqrt(sum(1 / len(x) for x in ways)) / 2
-        scatter = Influence(id=f"scatter/ripple/{s}", name="scatter of the runs", u=u, unit="rad/s", kind="A",
-                            distribution="normal", dof=float(dof))  # fmt: skip
-        out[f"ripple_{name}"] = Estimate.of(float(np.mean([x.mean() for x in ways])), scatter)
+        total = Estimate.exact(0.0, "rad/s")
+        for d, way in WAYS.items():
+            found = fit.ripple(np.array([w.turning.swings for w in of[s].windows if w.direction == d]))
+            n = len(found.off)
+            u = math.sqrt(float((found.off**2).sum()) / (n - 1) / n)
+            scatter = Influence(id=f"scatter/ripple/{s}/{way}", name=f"scatter of the runs, {way}", u=u, unit="rad/s", kind="A",
+                                distribution="normal", dof=float(n - 1))  # fmt: skip
+            total = total + Estimate.of(found.size, scatter) * 0.5
+        out[f"ripple_{name}"] = total
     return out

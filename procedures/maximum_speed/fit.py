@@ -44,14 +44,14 @@ def share(limit: float, i_x: Array, i_y: Array, sharing: str) -> Array:
 
 @dataclass(frozen=True)
 class Turning:
-    """Mean `speed` over whole turns, which the first `samples` are, rad/s with its sign; `seconds` that they last; `ripple`,
-    the rms of its orders 1 to 4, rad/s."""
+    """Mean `speed` over whole turns, which the first `samples` are, rad/s with its sign; `seconds` that they last; `swings` of
+    the speed with cos and sin of orders 1 to 4 of the rotor's angle, (8,) rad/s."""
 
     speed: float
     turns: int
     samples: int
     seconds: float
-    ripple: float
+    swings: Array
 
 
 def turning(t: Array, angle: Array) -> Turning:
@@ -59,8 +59,8 @@ def turning(t: Array, angle: Array) -> Turning:
 
     A whole number of turns, so that what the encoder says wrongly over a turn is left out, and what runout does to the speed.
     Over them theta = theta_0 + w t + sum a_n cos(n theta) + b_n sin(n theta) is fitted to every sample: w takes part in the
-    counts of all of them, and not of the two at the ends alone, and w' = w sum n (b_n cos - a_n sin) is the ripple, which no
-    filter has weakened.
+    counts of all of them, and not of the two at the ends alone. What swings is taken from the rates between samples: noise
+    makes the angle wander, which fills all orders of a short window, and the speed does not.
 
     Raises:
         AnalysisError: it turns less than twice.
@@ -74,12 +74,35 @@ def turning(t: Array, angle: Array) -> Turning:
             f"window: the rotor turns {turned[-1] / (2 * math.pi):.2f} times; expected {FEWEST_TURNS} or more"
         )
     last = int(np.searchsorted(turned, 2 * math.pi * turns))
-    x, time = turned[:last], t[:last] - t[0]
-    waves = [wave(n * x) for n in ORDERS for wave in (np.cos, np.sin)]
-    found = np.linalg.lstsq(np.column_stack([np.ones_like(time), time, *waves]), x, rcond=None)[0]
-    speed, terms = float(found[1]), found[2:].reshape(-1, 2)
-    size = float((np.array(ORDERS) ** 2 * (terms**2).sum(axis=1)).sum())
-    return Turning(way * speed, turns, last, float(time[-1]), speed * math.sqrt(size / 2))
+    x, time = unwrapped[:last], t[:last] - t[0]
+    speed = float(np.linalg.lstsq(np.column_stack([_orders(x), time]), x, rcond=None)[0][-1])
+    rates, between = np.diff(x) / np.diff(time), (x[1:] + x[:-1]) / 2
+    swings: Array = np.linalg.lstsq(_orders(between), rates, rcond=None)[0][1:]
+    return Turning(speed, turns, last, float(time[-1]), swings)
+
+
+def _orders(angle: Array) -> Array:
+    """1, and cos and sin of each order, (n, 9)."""
+    return np.column_stack([np.ones_like(angle), *(wave(n * angle) for n in ORDERS for wave in (np.cos, np.sin))])
+
+
+@dataclass(frozen=True)
+class Ripple:
+    """Rms of the orders in several windows, rad/s: its `size`, and how far each window's own lies from it, `off` (n,)."""
+
+    size: float
+    off: Array
+
+
+def ripple(swings: Array) -> Ripple:
+    """Of the swings (n, 8) of n windows, two or more. They turn with the rotor, so that their mean is a vector's; by its square
+    it is too long by what the windows scatter, which is taken off: noise moves the speed by more than runout does with (6.24).
+    """
+    mean, scattered = swings.mean(axis=0), float(swings.var(axis=0, ddof=1).sum()) / len(swings)
+    size = math.sqrt(max(float(mean @ mean) - scattered, 0.0) / 2)
+    least = math.sqrt(scattered / 2)
+    slope = mean / (2 * max(size, least)) if max(size, least) > 0 else mean
+    return Ripple(size, (swings - mean) @ slope)
 
 
 def count_u(t: Turning, counts: int) -> float:

@@ -40,6 +40,7 @@ T_C = Quantity("T_c", "N m", "Coulomb torque of the rotor alone, mean over the d
 J_Z = Quantity("J_z", "kg m^2", "polar inertia: by the ring where one was mounted, else the rig file's as used")
 MEASURES = (B, B_HIGH, T_C, J_Z)
 BY_SPEED, CARRIED = "by the speed channel", "motor carries"
+LEAD_S = 0.1  # of a run-up by the motor's torque current, before it is let go
 RAMP_S = 0.25  # what is left of the run-up's ramp when the speed is nearly there
 SLOW = (0.1, 0.15, 0.2, 0.25, 0.3)  # shares of the speed that the drive also holds: they tell its constant torque
 
@@ -139,8 +140,12 @@ def _run_down(rig: Rig, plan: Plan, record: Recorder, labels: Mapping[str, objec
     rig.clock.sleep(RAMP_S)
     with record.step("spin", speed_rad_s=reached, **labels):
         rig.clock.sleep(plan.steady_s)
-    let_go(rig, by)
+    if by == "drive":
+        let_go(rig, by)
     with record.step("coast", ring=labels["group"] == "ring", **labels):
+        if by == "motor":  # a link's answers take as long as a short run-down: its currents say when it was let go
+            rig.clock.sleep(LEAD_S)
+            let_go(rig, by)
         begun = rig.clock.now_ns()
         rig.clock.sleep(plan.start_delay_s + 0.5)
         while direction * rig.rotation.speed_rad_s > plan.end_speed_rad_s:

@@ -26,6 +26,9 @@ LONG_SAMPLES = 400
 SHORT_LAGS = 5  # for the angle then: it moves by two counts and more a sample, whose errors hardly repeat
 SMALLEST_SAMPLES = 150
 RELEASE_S = 0.01  # a command and the amplifiers: what drove the rotor is gone
+LED_SAMPLES = 20  # of a step that begins before the motor is let go
+GONE, GONE_SAMPLES = 0.1, 10  # of the torque current before: let go, if it stays so
+LEAST_A, ZERO_A = 0.03, 0.01  # that holds a speed; of its sensors without any
 
 
 def coils(machine: Servomotor) -> tuple[str, ...]:
@@ -84,6 +87,9 @@ def _read(step: Step, machine: Servomotor, delay_s: float, end: float) -> RunDow
     direction = int(labels["direction"])
     data = step.read(*channels(machine))
     name = f"{labels['bias_A']:g} A, {'forward' if direction > 0 else 'backward'}, run {int(labels['repeat']) + 1}"
+    if labels.get("by") == "motor":
+        begins = released(np.mean([data[c] for c in machine.segments], axis=0))
+        data = {channel: x[begins:] for channel, x in data.items()}
     t = (data["t_ns"] - data["t_ns"][0]).astype(np.float64) * 1e-9 if len(data["t_ns"]) else np.zeros(0)
     speed, angle = direction * data[SPEED], direction * np.unwrap(data[ANGLE])
     used = _span(t, speed, delay_s, end)
@@ -102,6 +108,17 @@ def _read(step: Step, machine: Servomotor, delay_s: float, end: float) -> RunDow
         segments=np.array([float(data[c][used].mean()) for c in machine.segments]),
         lost=step.lost(), expected=step.expected(), flags=int(np.bitwise_or.reduce(data[STATUS].astype(np.int64))),
     )  # fmt: skip
+
+
+def released(torque: Array) -> int:
+    """From which sample on the motor gives no torque, by its torque current (n,) A: the first of all where it gave none to
+    begin with, as in a recording that begins at the release, or where it never lets go."""
+    size = np.abs(torque)
+    before = float(size[:LED_SAMPLES].mean()) if len(size) >= LED_SAMPLES else 0.0
+    if before < LEAST_A:
+        return 0
+    stays = np.convolve(size < max(GONE * before, ZERO_A), np.ones(GONE_SAMPLES), "valid") > GONE_SAMPLES - 0.5
+    return int(np.argmax(stays))
 
 
 def _too_short(name: str, t: Array, used: slice, end: float) -> str:

@@ -201,6 +201,20 @@ def test_the_bound_by_hand() -> None:
     assert swing(6.0, 4.0, 1.0).excess == pytest.approx(-3.0)
 
 
+def test_how_long_amplifiers_cut_by_hand() -> None:
+    """Half of 20 ms beyond 10 A: sqrt((4.1 + 4)^2 + 6^2) is, sqrt((4 + 4)^2 + 6^2) = 10 A, rounded when told, is not."""
+    assert [swing(6.0, 4.0, i).cut for i in (4.1, -4.1, 4.0 + 1e-6, 1.0)] == pytest.approx([0.01, 0.01, 0.0, 0.0])
+
+
+def test_how_long_amplifiers_cut_is_told_by_captures(nominal_run: Simulated) -> None:
+    measured, truth = values(nominal_run), truth_of_motion(nominal_run)
+    for where in ("static, 15°, 1000 Hz", "priority, 15°, 1000 Hz"):
+        found = measured["saturated", where]
+        assert abs(found.value - truth[f"saturated@{where}"]) < 2.6 * found.u
+        assert found.u < 1e-3
+    assert measured["saturated", "priority, 15°, 1000 Hz"].value == 0.0
+
+
 def test_the_largest_amplitude_is_freed_of_sensors_and_noise() -> None:
     """q1 = 8, d1 = -6: 10 A; gains 1.01 and offsets 0.05 A are taken off, and so is half of what noise may add."""
     s = swing(6.0, 4.0, 4.0)

@@ -126,14 +126,15 @@ def test_a_drawn_machine_that_the_plan_is_none_for_is_counted_apart(tmp_path: Pa
 
 def test_a_commutation_that_is_meant_to_be_late_is_sound(tmp_path: Path, known: dict[str, Calibration]) -> None:
     """T's own, by the prototype 584 in place of 603 r/min: i_x takes part of what the field is turned by. A lag and the
-    encoder's zero drive the rotor one way together, 0.1 N m and more, which drops out of the mean over both directions."""
-    done = run(tmp_path, "tsbs12-drag", 2026, known, commutation="late")
+    encoder's zero drive the rotor one way together, 0.1 N m and more, which drops out of the mean over both directions. Noise
+    takes five times as much torque one way as the other: of three runs each way the interval has hardly more than two degrees
+    of freedom."""
+    done = run(tmp_path, "tsbs12-drag", 2026, known, commutation="late", repeats=5)
     found, true = results(done), truth_of_motion(done)
     assert serious(done) == {}
     assert found["ratio"].value / found["ratio_predicted"].value == pytest.approx(1, abs=0.01)
-    for name in ("speed_op", "ratio"):
-        assert found[name].value == pytest.approx(true[name], rel=5e-4), name
-    assert abs(found["predicted_op"].value - true["predicted_op"]) < 1.6 * interval(found["predicted_op"]).U
+    for name in ("speed_op", "ratio", "predicted_op"):
+        assert abs(found[name].value - true[name]) < 1.6 * interval(found[name]).U, name
 
 
 def test_what_is_missing_is_said_with_the_commands_that_make_it(tmp_path: Path) -> None:

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from bench.errors import AnalysisError
+from bench.uncertainty import interval
 from procedures.maximum_speed import fit
+from procedures.maximum_speed.estimates import scatter
 from procedures.maximum_speed.plan import HALF, OP, Plan
 from procedures.maximum_speed.running import order
 
@@ -51,7 +53,36 @@ def test_speed_of_whole_turns_and_ripple_of_an_uneven_rotor(way: int) -> None:
     assert found.turns == turns == 13
     assert found.speed == pytest.approx(way * true, abs=4 * fit.count_u(found, 4096))
     assert fit.count_u(found, 4096) < 5e-5  # the two ends alone leave 3e-4
-    assert found.ripple == pytest.approx(math.sqrt((0.2**2 + 0.1**2) / 2), rel=0.01)
+    turned = [0.2 * math.cos(0.4), 0.2 * math.sin(0.4), way * 0.1 * math.sin(-0.8), way * 0.1 * math.cos(0.8)]
+    assert way * found.swings[:4] == pytest.approx(turned, abs=5e-3)
+    assert fit.ripple(np.array([found.swings] * 2)).size == pytest.approx(math.sqrt((0.2**2 + 0.1**2) / 2), rel=0.02)
+
+
+def test_noise_does_not_lengthen_the_ripple_and_its_interval_holds_it() -> None:
+    """0.1 rad/s rms under 0.06 of noise on each of eight parts of five windows: their own lengths are 0.16 on average, and the
+    length of their mean still 0.106."""
+    true, noise = np.array([0.1, 0.1, 0, 0, 0, 0, 0, 0]), np.random.default_rng(7)
+    sizes, inside = [], []
+    for _ in range(4000):
+        found = fit.ripple(true + 0.06 * noise.standard_normal((5, 8)))
+        sizes.append(found.size)
+        u = math.sqrt(float((found.off**2).sum()) / 4 / 5)
+        inside.append(abs(found.size - 0.1) < 2.78 * u)
+    assert np.mean(sizes) == pytest.approx(0.1, abs=0.003)
+    assert np.mean(inside) == pytest.approx(0.95, abs=0.02)
+    assert fit.ripple(np.zeros((3, 8))).size == 0
+
+
+def test_directions_of_different_scatter_have_an_interval_of_their_own_degrees_of_freedom() -> None:
+    """Backward five times forward, five windows each: nearly all of it has four degrees of freedom, and with the eight of both
+    together 0.93 of the intervals would hold."""
+    noise, inside = np.random.default_rng(11), []
+    for _ in range(1500):
+        rows = {"forward": 1e-3 * noise.standard_normal((5, 3)), "backward": 5e-3 * noise.standard_normal((5, 3))}
+        mean = sum(r.mean(axis=0) for r in rows.values()) / 2
+        found = scatter(HALF, {way: r - r.mean(axis=0) for way, r in rows.items()})
+        inside.append([abs(m) < interval(e).U for m, e in zip(mean, found.values(), strict=True)])
+    assert np.mean(inside, axis=0) == pytest.approx(0.95, abs=0.017)
 
 
 def test_a_rotor_that_hardly_turns_has_no_speed() -> None:

@@ -13,7 +13,7 @@ from scipy.signal import lfilter
 
 from bench.errors import AnalysisError
 from procedures.spindown import fit
-from procedures.spindown.steps import SHORT_LAGS, SMALLEST_SAMPLES, SPEED_LAGS
+from procedures.spindown.steps import SHORT_LAGS, SMALLEST_SAMPLES, SPEED_LAGS, released
 
 RPM = math.pi / 30
 J, B, T_C = 0.033, 0.081, 0.1
@@ -137,3 +137,13 @@ def test_a_ring_of_known_inertia_gives_the_inertia() -> None:
 def test_what_is_no_run_down_is_told(w: np.ndarray) -> None:
     with pytest.raises(AnalysisError):
         fit.of_speed(np.arange(len(w)) * 1e-3, w, 10)
+
+
+def test_a_run_down_begins_where_the_motor_lets_go() -> None:
+    """4 A until 0.137 s, and 0.3 ms of the amplifiers. Gains are written one after the other: what is gone for 5 ms only is not
+    let go. A step that begins at the release is whole, and so is one in which the motor never lets go: it shows that."""
+    noise, k = np.random.default_rng(3).normal(0, 1e-3, 600), np.arange(600)
+    torque = np.where(k < 137, 4.0, 4.0 * np.exp(-(k - 137) / 0.3)) + noise
+    assert released(torque) == released(-torque) == 138
+    assert released(np.where((k > 60) & (k < 66), 0.0, torque)) == 138
+    assert released(0.01 + 5 * noise) == released(np.full(600, 4.0)) == released(np.zeros(0)) == 0

@@ -111,8 +111,11 @@ class _Carried:
             ("excess", float(peaks[0] - at_rest[0])),
             ("peak_motor", float(peaks[1])),
         )
-        flags = np.concatenate([after.flags, *(rows[:, -1].astype(np.int64) for rows in (late, later))])
-        yield "saturated", float((flags & SEGMENT_SATURATED != 0).sum()) * PERIOD_TICKS * TICK_S
+        if self.p.phases == 6:
+            yield "saturated", _cut(after.trace, self.p.segment_limit)
+        else:
+            flags = np.concatenate([after.flags, *(rows[:, -1].astype(np.int64) for rows in (late, later))])
+            yield "saturated", float((flags & SEGMENT_SATURATED != 0).sum()) * PERIOD_TICKS * TICK_S
         if self.p.phases == 6:
             yield "amplitude", self._amplitude(after.trace)
         if case.bounded:
@@ -167,6 +170,12 @@ def _response(y: Array, first: int, case: AngleCase) -> Iterator[tuple[str, floa
     yield "overshoot", max(float(y.max()) / case.size - 1, 0.0)
     outside = np.flatnonzero(np.abs(y - case.size) > case.band)
     yield "settling_time", (float(outside[-1]) + 1 - first) * TICK_S if len(outside) else 0.0
+
+
+def _cut(trace: Array, limit: float) -> float:
+    """How long an amplifier of six phases has cut its current, s: amplitudes by T (7.12)."""
+    x, y, torque = (np.abs(trace[:, LAW[name]]) for name in ("demand_x", "demand_y", "torque_given"))
+    return float((np.hypot(torque + y, x) > limit * (1 + 1e-9)).sum()) * TICK_S
 
 
 def _beyond(trace: Array, limit: float) -> float:

@@ -1,0 +1,25 @@
+"""The truth of a run at the torque limit: what is taken of the readings of a rotor that turns unevenly."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from sim_backend.core.plant import TICK_S
+from sim_backend.machines.tsbs.truth_speed import over_turns
+
+
+@pytest.mark.parametrize("seconds", [8.0, 8.03, 8.07, 8.11])
+def test_a_part_of_a_turn_changes_neither_speed_nor_bound(seconds: float) -> None:
+    """w = 43 + 0.3 cos(angle): sqrt(43^2 - 0.3^2) rad/s on average. A swing of the bound by 0.2 A along the turn would leave up
+    to 0.2/(43 * 8) A, 6e-4, of a part of one, and the swing of the angle by 7 mrad up to 1.7e-3 rad/s."""
+    angle = np.zeros(round(seconds / TICK_S))
+    for k in range(1, len(angle)):
+        angle[k] = angle[k - 1] + TICK_S * (43.0 + 0.3 * math.cos(angle[k - 1] + TICK_S * 21.5))
+    count = 2 * math.pi / 4096
+    speed, bound, ripple = over_turns(np.round((0.7 + angle) / count) * count, 4.0 + 0.2 * np.sin(angle))
+    assert speed == pytest.approx(math.sqrt(43.0**2 - 0.3**2), abs=2e-5)
+    assert bound == pytest.approx(4.0, abs=1e-3)
+    assert ripple == pytest.approx(0.3 / math.sqrt(2), rel=0.02)
