@@ -13,10 +13,11 @@ from bench.findings import Effect, Finding
 from bench.recording import Recording
 from bench.uncertainty import coverage_factor
 from bench.units import RPM
-from procedures.sensitivity.estimates import Peak, Result
+from procedures.sensitivity.estimates import Peak, Result, mode_top
 from procedures.sensitivity.plan import Plan
 from procedures.sensitivity.steps import (
     INJECT,
+    MODE,
     Taken,
     folds,
     grid_of,
@@ -169,6 +170,14 @@ def _covered(r: Result) -> Iterator[Finding]:
         near |= (r.curve.hz >= p.taken.response.hz[0]) & (r.curve.hz <= p.taken.response.hz[-1])
     over = np.where(near, -np.inf, size - SURE * np.maximum(u, np.median(u)) - best.value - 2 * best.u)
     k = int(over.argmax())
+    for t in (t for t in r.taken if t.kind == MODE):
+        crest = mode_top(t.response, t.noise)
+        apart = crest is not None and all(abs(crest.at - p.top.at) > p.top.width for p in r.peaks)
+        if crest is not None and apart and crest.value - 2 * crest.u > best.value + 2 * best.u:
+            text = (f"a bending mode near {crest.at:.5g} Hz has a greater |S|, {crest.value:.2f} ± {2 * crest.u:.2f} between "
+                    "its lines, and was not refined. Name it in modes_hz, with the damping it has.")  # fmt: skip
+            yield Finding("peak-not-refined", text, r.where, Effect.INDETERMINATE, (f"@{r.where}",))
+            return
     if over[k] > 0 or not best.inside:
         place = (
             f"|S| is {size[k]:.2f} at {r.curve.hz[k]:.4g} Hz, outside"
@@ -217,7 +226,8 @@ def _notes(results: Sequence[Result], plan: Plan) -> Iterator[Finding]:
                 f"{p.top.width:.3g} Hz, lines {p.taken.grid.step:g} Hz apart, least coherence {p.coherence:.3f}; "
                 f"{p.change:+.2%} ± {2 * p.u_change:.2%} at half the amplitude.")  # fmt: skip
         if (top := _alone(r)) is not None:
-            text += f" One sine at a time: this is the greatest value up to {top:.4g} Hz, the highest line."
+            text += (f" One sine at a time: this is the greatest value up to {top:.4g} Hz, the highest line; a bending mode "
+                     "narrower than its lines stand apart is not seen.")  # fmt: skip
         yield Finding("zone", text, r.where)
         yield from _margins(r)
         if r.excluded:

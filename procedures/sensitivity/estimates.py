@@ -13,7 +13,7 @@ from bench.analysis.rational import Rational, Top, averaged, fitted, orders, top
 from bench.analysis.responses import Response, image_distance
 from bench.uncertainty import Estimate, Influence
 from procedures.sensitivity.margins import margins, merged
-from procedures.sensitivity.steps import HALF, MODE, REFINED, SURVEY, WIRING, Taken, name_speed, shared_noise
+from procedures.sensitivity.steps import HALF, MODE, REFINED, SCAN, SURVEY, WIRING, Taken, name_speed, shared_noise
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -25,6 +25,7 @@ REACH = (
 LEAST = 6  # steps to either side of it, at least
 RIVAL = 0.85  # of the greatest: another maximum that is refined too
 CANDIDATES = 3
+FEWEST = 8  # lines that a resonance is looked for in
 NEAR = 0.3  # of a frequency: how far the lines reach that a first look is fitted to
 
 
@@ -88,12 +89,19 @@ def binary(x: float) -> float:
     return float(2.0 ** math.floor(math.log2(x)))
 
 
-def candidates(seen: Sequence[Response], octaves: bool = False) -> list[Candidate]:
-    """Where a survey peaks, the greatest first, and those that come near it; `octaves`: its lines stand that far apart."""
+def candidates(
+    seen: Sequence[Response], octaves: bool = False, about_modes: Sequence[Response] = ()
+) -> list[Candidate]:
+    """Where a survey peaks, the greatest first, and those that come near it; `octaves`: its lines stand that far apart.
+    A lightly damped mode peaks between the lines `about_modes`: there their model is asked."""
     if not seen:
         return []
     hz, z, power = merged([(r, shared_noise(r, octaves)) for r in seen])
-    size, free = np.abs(z) - np.sqrt(power), np.ones(hz.size, bool)
+    tops = [t for r in about_modes if (t := mode_top(r, shared_noise(r))) is not None and t.inside]
+    free = np.ones(hz.size, bool)
+    for r in about_modes:
+        free &= (hz < r.hz[0]) | (hz > r.hz[-1])
+    size = np.where(free, np.abs(z) - np.sqrt(power), 0.0)
     out: list[Candidate] = []
     while free.any() and len(out) < CANDIDATES:
         k = int(np.flatnonzero(free)[size[free].argmax()])
@@ -103,14 +111,22 @@ def candidates(seen: Sequence[Response], octaves: bool = False) -> list[Candidat
         out.append(found)
         free &= np.abs(hz - found.hz) > 2 * found.width
         free[k] = False
-    return out
+    lasting = [t for t in tops if t.value > RIVAL * size.max() and math.isfinite(t.width)]
+    return [*out, *(Candidate(t.at, t.width) for t in lasting)]
+
+
+def mode_top(r: Response, power: Array) -> Top | None:
+    """The greatest abs of the model of lines about a bending mode; None of too few."""
+    if r.hz.size < FEWEST:
+        return None
+    return top(fitted(r.hz, r.values, power, math.inf), float(r.hz[0]), float(r.hz[-1]))
 
 
 def _looked(hz: Array, z: Complex, power: Array, k: int) -> Candidate:
     """A first look at the resonance about line `k`: by a model of the lines near it."""
     reach = max(NEAR * hz[k], hz[min(k + 6, hz.size - 1)] - hz[k])
     near = np.abs(hz - hz[k]) <= reach
-    if near.sum() < 8:
+    if near.sum() < FEWEST:
         return Candidate(float(hz[k]), float(NEAR * hz[k]))
     model = fitted(hz[near], z[near], power[near], math.inf)
     at = top(model, float(hz[near][0]), float(hz[near][-1]))
@@ -141,7 +157,7 @@ def _result(axis: str, speed: float, taken: Sequence[Taken]) -> Result:
             best.top.at, best.top.u_at, "Hz", f"{where}/s_max_hz", "scatter of the peak's place", dof
         )
     wide = [t for t in taken if t.kind == SURVEY or (t.kind == REFINED and t.step_hz == 0)]  # lines of sines are few
-    estimates |= margins(wide, where)
+    estimates |= margins(wide, where, [t for t in taken if t.kind == MODE])
     return Result(axis, speed, tuple(taken), _curve(taken), tuple(found), estimates)
 
 
@@ -152,7 +168,7 @@ def _typed(value: float, u: float, unit: str, identity: str, name: str, dof: flo
 def found_peaks(taken: Sequence[Taken]) -> Iterator[Peak]:
     """What was refined, each with its model."""
     for t in taken:
-        if t.kind != REFINED or t.response.hz.size < 8:
+        if t.kind != REFINED or t.response.hz.size < FEWEST:
             continue
         r = t.response
         models = orders(r.hz, r.values, t.noise, t.dof)
@@ -175,14 +191,13 @@ def _change(t: Taken, half: Taken, high: npt.NDArray[np.bool_]) -> tuple[float, 
 def _curve(taken: Sequence[Taken]) -> Response:
     """All lines at the full amplitude; where passes overlap, the finest of them."""
     some = [t for t in taken if t.kind not in (WIRING, HALF)]
-    fine = [(t.response.hz[0], t.response.hz[-1]) for t in some if t.kind in (MODE, REFINED) and t.response.hz.size]
+    finer: Mapping[str, tuple[str, ...]] = {SURVEY: (SCAN, MODE, REFINED), SCAN: (MODE, REFINED)}
     parts = []
     for t in some:
         r = t.response
         covered = np.zeros(r.hz.size, bool)
-        if t.kind == SURVEY:
-            for low, high in fine:
-                covered |= (r.hz >= low) & (r.hz <= high)
+        for other in (o.response.hz for o in some if o.kind in finer.get(t.kind, ()) and o.response.hz.size):
+            covered |= (r.hz >= other[0]) & (r.hz <= other[-1])
         parts.append(r.at(~covered))
     hz = np.concatenate([r.hz for r in parts])
     order = np.argsort(hz, kind="stable")

@@ -49,7 +49,8 @@ def _injection(rig: RigFile, plan: Plan, combs: Sequence[tuple[str, Comb]]) -> I
     if can is not None and (why := find_refusal(Envelope(rig), can, greatest)):
         key, found = ("sine_A", greatest.amplitude) if one else ("amplitude_A", plan.amplitude_A)
         yield f"{key}: found {found:g} A for each line; expected less: {why}"
-    for key, value in (("low_hz", plan.low_hz), ("high_step_hz", plan.high_step_hz)):
+    steps = (("low_hz", plan.low_hz), ("high_step_hz", plan.high_step_hz), ("scan_step_hz", plan.scan_step_hz or 1.0))
+    for key, value in steps:
         if math.log2(value) % 1:
             yield f"{key}: found {value:g}; expected a power of two: the lines must repeat after whole samples"
     if len({*plan.axes}) < len(plan.axes):

@@ -33,8 +33,9 @@ ABOUT = 1.5  # of the frequency where |L| is 1: lines by which single sines' pha
 MISFIT = 3.0  # standard deviations of its chi-squared over what noise explains: a bending mode is among the lines
 
 
-def margins(surveys: Sequence[Taken], where: str) -> dict[str, Estimate]:
-    """Phase margin and both gain margins by the lines of the survey, those that exist and are told from noise."""
+def margins(surveys: Sequence[Taken], where: str, modes: Sequence[Taken] = ()) -> dict[str, Estimate]:
+    """Phase margin and both gain margins by the lines of the survey, those that exist and are told from noise; the gain that
+    may rise also by the lines about bending `modes`, whose circles reach across the axis."""
     if not surveys:
         return {}
     hz, z, power = merged([(t.response, t.noise) for t in surveys])
@@ -55,6 +56,10 @@ def margins(surveys: Sequence[Taken], where: str) -> dict[str, Estimate]:
         "gain_increase": ("1", _least(hz, z, base, power, drawn, smooth, OF_SINES if alone else REACHES)),
     }
     dof = {name: max(float(min(t.dof for t in surveys)), 1.0) for name in found}
+    for t in modes:
+        of, nearest = of_mode(t), found["gain_increase"][1]
+        if of is not None and (nearest is None or of[0] > nearest[0]):
+            found["gain_increase"], dof["gain_increase"] = ("1", of), max(t.dof, 1.0)
     dof["gain_reduction"] = max(float(min(t.dof_at_ends for t in surveys)), 1.0)
     out = {}
     for name, (unit, of) in found.items():
@@ -66,6 +71,16 @@ def margins(surveys: Sequence[Taken], where: str) -> dict[str, Estimate]:
     if "gain_increase" in out:  # that of L is what scatters alike to both sides
         out["gain_increase"] = replace(1 / out["gain_increase"], unit="1")
     return out
+
+
+def of_mode(t: Taken) -> tuple[float, float] | None:
+    """|L| where the circle of a bending mode crosses the negative real axis farthest out, and its u, by rational models of
+    the lines about it; None where it does not cross there."""
+    r = t.response
+    if r.hz.size < rational.LEAST:
+        return None
+    fine = np.linspace(r.hz[0], r.hz[-1], 20 * r.hz.size)
+    return _by_models(rational.orders(r.hz, r.values, t.noise, t.dof), fine, lambda s: 1 / rise(1 / s - 1))
 
 
 def merged(parts: Sequence[tuple[Response, Array]]) -> tuple[Array, Complex, Array]:
@@ -99,19 +114,20 @@ def _modelled(x: Array, seen: Complex, lines: tuple[Array, Complex, Array]) -> t
     hz = lines[0][near]
     if hz.size < rational.LEAST:
         return None
-    kept = rational.weighed(rational.orders(hz, lines[1][near], lines[2][near], math.inf))
-    fine = np.linspace(hz[0], hz[-1], 20 * hz.size)
-    told = [_of_model(m, fine) for _, m in kept]
-    known = [(w, t) for (w, _), t in zip(kept, told, strict=True) if t is not None]
+    models = rational.orders(hz, lines[1][near], lines[2][near], math.inf)
+    return _by_models(models, np.linspace(hz[0], hz[-1], 20 * hz.size), lambda s: phase(1 / s - 1))
+
+
+def _by_models(
+    models: Sequence[rational.Rational], fine: Array, of: Callable[[Complex], float]
+) -> tuple[float, float] | None:
+    """A margin by the models of several orders with Akaike's weights, and its u; by those that have it."""
+    told = [(w, _told((s := m.at(fine), s, rational.drawn_curves(m, fine)), of)) for w, m in rational.weighed(models)]
+    known = [(w, t) for w, t in told if t is not None]
     if not known:
         return None
     weight = np.array([w for w, _ in known]) / sum(w for w, _ in known)
     return rational.pooled(weight, *np.array([t for _, t in known]).T)
-
-
-def _of_model(model: rational.Rational, fine: Array) -> tuple[float, float] | None:
-    seen = model.at(fine)
-    return _told((seen, seen, rational.drawn_curves(model, fine)), lambda s: phase(1 / s - 1))
 
 
 def _freed(found: float, again: float, values: Array) -> tuple[float, float] | None:

@@ -22,6 +22,7 @@ class Plan(BenchPlan):
     middle_hz: float = Field(256.0, gt=0)  # up to here the odd multiples of low_hz; above it every high_step_hz
     high_step_hz: float = Field(16.0, gt=0)
     high_hz: float = Field(2000.0, gt=0)
+    scan_step_hz: float = Field(4.0, ge=0)  # of the lines above middle_hz that look for modes not named; 0: none
     modes_hz: tuple[float, ...] = ()  # bending modes, about which a finer grid is laid
     mode_within_hz: float = Field(26.0, gt=0)  # to either side
     mode_damping: float = Field(2e-3, gt=0)  # least that is expected of them

@@ -26,7 +26,7 @@ from bench.rigfile.capture import Layout
 from procedures.amb_rotor import lift, pushes, wiring
 from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.laws import of_laws
-from procedures.sensitivity import checks, estimates, fitting, sines
+from procedures.sensitivity import checks, estimates, fitting, modes, sines
 from procedures.sensitivity import figures as drawn
 from procedures.sensitivity.estimates import Candidate, Result
 from procedures.sensitivity.fitting import chosen_axes
@@ -39,6 +39,7 @@ from procedures.sensitivity.steps import (
     MODE,
     PULSED,
     REFINED,
+    SCAN,
     SURVEY,
     WIRING,
     captured_channels,
@@ -68,18 +69,27 @@ def surveys(plan: Plan, speed: float) -> list[tuple[str, float, Comb]]:
     it is a quarter where that keeps them apart from their images by the orbit.
     """
     a, step = plan.amplitude_A, 2 * plan.low_hz
-    turns = speed / (2 * math.pi * step)
-    share = max((0.5, 0.25, 0.75), key=lambda share: image_distance(share, turns)) if speed else 0.5
+    share = _share(step, speed)
     high = plan.high_step_hz * (math.floor(plan.middle_hz / plan.high_step_hz) + 0.5)
     out = [(WIRING, 0.0, Comb(FOLLOWED_HZ, 2 * FOLLOWED_HZ, FOLLOWED, a))]
     out += [(SURVEY, 0.0, c) for c in combs(share * step, step, min(plan.middle_hz, plan.high_hz), a)]
     if high < plan.high_hz:
         out += [(SURVEY, 0.0, c) for c in combs(high, plan.high_step_hz, plan.high_hz, a)]
+    if plan.scan_step_hz and high < plan.high_hz:
+        first = plan.middle_hz + _share(plan.scan_step_hz, speed) * plan.scan_step_hz
+        out += [(SCAN, 0.0, c) for c in combs(first, plan.scan_step_hz, plan.high_hz, a)]
     for hz in plan.modes_hz:
         step = estimates.binary(plan.mode_damping * hz)  # half of the half-power width 2 zeta f
         low = step * math.floor((hz - plan.mode_within_hz) / step)
         out += [(MODE, hz, c) for c in combs(low, step, hz + plan.mode_within_hz, a)]
     return out
+
+
+def _share(step: float, speed: float) -> float:
+    """By which share of a step lines stand off its multiples: half of one, or where the turning shaft's orbit has their images
+    clear of them."""
+    turns = speed / (2 * math.pi * step)
+    return max((0.5, 0.25, 0.75), key=lambda share: image_distance(share, turns)) if speed else 0.5
 
 
 def refinements(plan: Plan, about: Candidate, speed: float) -> list[tuple[str, float, Comb]]:
@@ -134,12 +144,21 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
 def _axis(rig: Rig, plan: Plan, record: Recorder, speed: float, axis: str, number: int) -> int:
     """Both passes of an axis; the number of the next capture."""
     seen: list[Response] = []
+    scans: list[Response] = []
+    about_modes: list[Response] = []
     one = sines.makes_one(rig.file)
     for kind, about, comb in first_pass(rig.file, plan, speed):
         found = _take(rig, plan, record, speed, axis, kind, about, comb, number)
-        seen += [found] if found is not None and kind != WIRING else []
+        if found is not None and kind != WIRING:
+            {SCAN: scans, MODE: about_modes}.get(kind, seen).append(found)
         number += 1
-    for candidate in estimates.candidates(sines.as_one(seen) if one else seen, one):
+    for comb in modes.unnamed(scans, plan):
+        found = _take(rig, plan, record, speed, axis, MODE, comb.hz[comb.count // 2], comb, number)
+        about_modes += [found] if found is not None else []
+        number += 1
+    if one:
+        seen, about_modes = sines.as_one([*seen, *about_modes]), []
+    for candidate in estimates.candidates(seen, one, about_modes):
         again = sines.refinements(rig.file, plan, candidate) if one else refinements(plan, candidate, speed)
         for kind, about, comb in again:
             _take(rig, plan, record, speed, axis, kind, about, comb, number)

@@ -22,7 +22,7 @@ from procedures.shared.signals import clips
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 INJECT, NOT_REACHED = "inject", "not-reached"
-WIRING, SURVEY, MODE, REFINED, HALF = "wiring", "survey", "mode", "refined", "half"
+WIRING, SURVEY, SCAN, MODE, REFINED, HALF = "wiring", "survey", "scan", "mode", "refined", "half"
 LOOP = ("inject", "before", "after")
 PULSED = ("pulses", "pulse_age")
 ORDERS = (1.0, 2.0, 3.0, 4.0)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from bench.errors import AnalysisError
 from sim_backend.core import TICK_S
 
 Array = npt.NDArray[np.float64]
@@ -114,11 +115,17 @@ def steps(
 
 def _moved(plant: Any, of: Watched, end: float, before: Array, record_s: float, turn_s: float) -> tuple[Array, float]:
     """Along an axis, from where it rested `before`: the position as read (n,) m, and where the shaft itself is in the end. What
-    turns with the shaft is taken away, as a twin that makes no step shows it."""
+    turns with the shaft is taken away, as a twin that makes no step shows it.
+
+    Raises:
+        AnalysisError: the shaft does not stay up.
+    """
     k, many = COORDINATES.index(of.axis), of.ticks(record_s)
     still = plant.twin()
     of.write(plant, end)
     after, beside = plant.run(many, 1)[1], still.run(many, 1)[1]
+    if min(len(after), len(beside)) < many:
+        raise AnalysisError(f"steps of {of.axis}: found {len(after)} of {many} ticks; the shaft does not stay up")
     out = []
     for true in (False, True):
         x, twin, rest = (of.seen(trace, true)[k] for trace in (after, beside, before))

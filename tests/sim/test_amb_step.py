@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from bench.errors import AnalysisError
 from bench.rigfile import load_rig
 from sim_backend.core import TICK_S
 from sim_backend.machines.amb5dof import truth_step
@@ -54,3 +55,12 @@ def test_a_shaft_that_turns_answers_with_its_own_unbalance() -> None:
     up = shown[size, 1].y
     assert up[1000 : 1000 + 20 * turn].mean() == pytest.approx(np.mean(found), abs=2e-4)
     assert np.ptp(up[-turn:]) < 2e-3  # the shaft whirls by a third of the step; none of it is left
+
+
+def test_a_shaft_that_falls_shows_no_steps() -> None:
+    """On rings 26 um away: it touches them while it steps, and its record ends there."""
+    rig = load_rig("amb5dof")
+    settings = {n: p.default for n, p in rig.parameters.items()} | {"law": float(CCS)}
+    plant = truth_step.quiet(draw(rig, 18, {"geometry.clearance": 26e-6}).plant)
+    with pytest.raises(AnalysisError, match="does not stay up"):
+        truth_step.truth(plant, settings, "y", [20e-6], record_s=1.5)
