@@ -8,14 +8,15 @@ A file for another rig has a name of its own and says which `procedure` it is fo
 Each size is tried on a few seeds first; then the sizes that may be the smallest one caught go on to all seeds. What is done is
 appended to FOLDER/PROCEDURE.jsonl, and the same command goes on from there. Caught is a run with a finding above a note, one
 that ended early, or one that lacks a result it declares. A shift is the error (value less truth) of a quiet run less that of
-the same rig without the plant, in the latter's U: what a plant truly changes is no error, and what has no truth is not
-counted. Beside it stands that result's error in the U that the run itself states.
+the same rig without the plant, in the latter's U: what a plant truly changes is no error. Of a procedure that has
+no truth the values themselves are taken, unless the plant `changes` what is measured. Beside it stands that result's error in the U that the run itself states.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import math
 import tempfile
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
@@ -50,6 +51,7 @@ class Plant:
     size: float
     plan: tuple[str, ...] = ()
     truth: tuple[str, ...] = ()
+    changes: bool = False  # what is measured, so that a value without a truth says nothing
 
     @property
     def sound(self) -> Plant:
@@ -83,7 +85,10 @@ def bed_of(name: str) -> Bed:
     """Read from its file, which is called as its procedure is, or says which that is."""
     found = tomllib.loads((PLANTED / f"{name}.toml").read_text(encoding="utf-8"))
     plants = tuple(
-        tuple(Plant(p["name"], float(s), tuple(p.get("plan", ())), tuple(p.get("truth", ()))) for s in p["sizes"])
+        tuple(
+            Plant(p["name"], float(s), tuple(p.get("plan", ())), tuple(p.get("truth", ())), p.get("changes", False))
+            for s in p["sizes"]
+        )
         for p in found["plant"]
     )
     units = {p["name"]: "" if p["unit"] == "1" else f" {p['unit']}" for p in found["plant"]}
@@ -137,12 +142,17 @@ def line_of(done: Simulated) -> Line:
     codes = {r.code for r in done.results if isinstance(r, Finding) and r.effect is not Effect.NOTE}
     lacking = {q.name for q in done.procedure.measures if q not in done.procedure.optional}
     codes |= {f"no {name}" for name in lacking - {m.quantity.name for m in measured}}
-    values = {}
+    values: dict[str, list[float | None]] = {}
     for m in measured:
-        name = f"{m.quantity.name}@{m.where}"
+        name, U = f"{m.quantity.name}@{m.where}", interval(m.estimate, done.seed).U
         true = truth.get(name, truth.get(m.quantity.name))
         if true is not None:
-            values[name] = [m.estimate.value - true, interval(m.estimate, done.seed).U]
+            values[name] = [m.estimate.value - true, U]
+    if not values:
+        values = {
+            f"{m.quantity.name}@{m.where}": [m.estimate.value, interval(m.estimate, done.seed).U, None]
+            for m in measured
+        }
     return {"codes": sorted(codes), "values": values}
 
 
@@ -180,12 +190,14 @@ def do(bed: Bed, seeds: Sequence[int], plants: Sequence[Plant], path: Path, work
             file.writelines(json.dumps(line) + "\n" for line in job.result())
 
 
-def shift(line: Line, sound: Line) -> tuple[float, float, str]:
-    """The greatest of a quiet run's errors against the sound one's, in U of that, then its error in its own U, and which
-    result it is."""
+def shift(line: Line, sound: Line, changes: bool) -> tuple[float, float, str]:
+    """The greatest of a quiet run's errors against the sound one's, in U of that, then its error in its own U (NaN without a
+    truth), and which result it is."""
     new, old = line["values"], sound["values"]
-    both = [k for k in new if k in old and old[k][1] and new[k][1]]
-    moved = [(abs(new[k][0] - old[k][0]) / old[k][1], abs(new[k][0]) / new[k][1], k) for k in both]
+    both = [k for k in new if k in old and old[k][1] and new[k][1] and len(new[k]) == len(old[k])]
+    both = [k for k in both if not (changes and len(new[k]) > 2)]
+    own = {k: abs(new[k][0]) / new[k][1] if len(new[k]) == 2 else math.nan for k in both}
+    moved = [(abs(new[k][0] - old[k][0]) / old[k][1], own[k], k) for k in both]
     return max(moved, default=(0.0, 0.0, ""))
 
 
@@ -206,11 +218,14 @@ def rows(bed: Bed, known: Mapping[str, Line]) -> Iterator[str]:
                 smallest = "none"
             elif smallest == "none":
                 smallest = f"{plant.size:.10g}"
-            quiet = [shift(line, sound) for line, sound in lines if not line["codes"] and not sound["codes"]]
+            quiet = [
+                shift(line, sound, plant.changes) for line, sound in lines if not line["codes"] and not sound["codes"]
+            ]
             worst = max([worst, *((*found, plant.size) for found in quiet)])
         by, own, what, size = worst
         what = what.rstrip("@").replace("@", ", ")
-        text = f"{by:.1f} U ({what}, {size:.10g}) | {own:.1f}" if what else "none quiet | "
+        none = "changes what is measured" if sizes[0].changes else "none quiet"
+        text = f"{by:.1f} U ({what}, {size:.10g}) | {'' if math.isnan(own) else f'{own:.1f}'}" if what else f"{none} | "
         yield f"| `{sizes[0].name}`{bed.units[sizes[0].name]} | {', '.join(shares)} | {smallest} | {text} |"
 
 
