@@ -8,8 +8,9 @@ A file for another rig has a name of its own and says which `procedure` it is fo
 Each size is tried on a few seeds first; then the sizes that may be the smallest one caught go on to all seeds. What is done is
 appended to FOLDER/PROCEDURE.jsonl, and the same command goes on from there. Caught is a run with a finding above a note, one
 that ended early, or one that lacks a result it declares. A shift is the error (value less truth) of a quiet run less that of
-the same rig without the plant, in the latter's U: what a plant truly changes is no error. Of a procedure that has
-no truth the values themselves are taken, unless the plant `changes` what is measured. Beside it stands that result's error in the U that the run itself states.
+the same rig without the plant, in the latter's U: what a plant truly changes is no error. Of a procedure that has no truth the
+values themselves are taken, unless the plant `changes` what is measured. Beside it stands that result's error in the U that the
+run itself states.
 """
 
 from __future__ import annotations
