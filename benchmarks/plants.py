@@ -52,6 +52,7 @@ class Plant:
     size: float
     plan: tuple[str, ...] = ()
     truth: tuple[str, ...] = ()
+    says: str = ""  # of it, beside its name
     changes: bool = False  # what is measured, so that a value without a truth says nothing
 
     @property
@@ -87,11 +88,12 @@ def bed_of(name: str) -> Bed:
     found = tomllib.loads((PLANTED / f"{name}.toml").read_text(encoding="utf-8"))
     plants = tuple(
         tuple(
-            Plant(p["name"], float(s), tuple(p.get("plan", ())), tuple(p.get("truth", ())), p.get("changes", False))
+            Plant(p["name"], float(s), tuple(p.get("plan", ())), tuple(p.get("truth", ())), p.get("says", ""),
+                  p.get("changes", False))
             for s in p["sizes"]
         )
         for p in found["plant"]
-    )
+    )  # fmt: skip
     units = {p["name"]: "" if p["unit"] == "1" else f" {p['unit']}" for p in found["plant"]}
     return Bed(found.get("procedure", name), found["rig"], tuple(found["plan"]), found.get("chain", {}), plants, units)
 
@@ -227,7 +229,8 @@ def rows(bed: Bed, known: Mapping[str, Line]) -> Iterator[str]:
         what = what.rstrip("@").replace("@", ", ")
         none = "changes what is measured" if sizes[0].changes else "none quiet"
         text = f"{by:.1f} U ({what}, {size:.10g}) | {'' if math.isnan(own) else f'{own:.1f}'}" if what else f"{none} | "
-        yield f"| `{sizes[0].name}`{bed.units[sizes[0].name]} | {', '.join(shares)} | {smallest} | {text} |"
+        name = f"`{sizes[0].name}`{bed.units[sizes[0].name]}" + (f", {sizes[0].says}" if sizes[0].says else "")
+        yield f"| {name} | {', '.join(shares)} | {smallest} | {text} |"
 
 
 def main() -> None:
