@@ -156,6 +156,7 @@ def of_results(results: Sequence[Result], plan: Plan) -> Iterator[Finding]:
             yield Finding("peak-not-refined", text, r.where, Effect.INDETERMINATE, (f"@{r.where}",))
             continue
         yield from _covered(r)
+        yield from _of_modes(r)
         for p in r.peaks:
             yield from _of_peak(p, plan, UNEXPLAINED / count)
     yield from _notes(results, plan)
@@ -170,14 +171,6 @@ def _covered(r: Result) -> Iterator[Finding]:
         near |= (r.curve.hz >= p.taken.response.hz[0]) & (r.curve.hz <= p.taken.response.hz[-1])
     over = np.where(near, -np.inf, size - SURE * np.maximum(u, np.median(u)) - best.value - 2 * best.u)
     k = int(over.argmax())
-    for t in (t for t in r.taken if t.kind == MODE):
-        crest = mode_top(t.response, t.noise)
-        apart = crest is not None and all(abs(crest.at - p.top.at) > p.top.width for p in r.peaks)
-        if crest is not None and apart and crest.value - 2 * crest.u > best.value + 2 * best.u:
-            text = (f"a bending mode near {crest.at:.5g} Hz has a greater |S|, {crest.value:.2f} ± {2 * crest.u:.2f} between "
-                    "its lines, and was not refined. Name it in modes_hz, with the damping it has.")  # fmt: skip
-            yield Finding("peak-not-refined", text, r.where, Effect.INDETERMINATE, (f"@{r.where}",))
-            return
     if over[k] > 0 or not best.inside:
         place = (
             f"|S| is {size[k]:.2f} at {r.curve.hz[k]:.4g} Hz, outside"
@@ -186,6 +179,19 @@ def _covered(r: Result) -> Iterator[Finding]:
         )
         text = f"{place} of where the grid was refined: the greatest value was not found. Survey with a finer grid."
         yield Finding("peak-not-refined", text, r.where, Effect.INDETERMINATE, (f"@{r.where}",))
+
+
+def _of_modes(r: Result) -> Iterator[Finding]:
+    """No bending mode may have a greater maximum between its lines."""
+    best = r.peaks[0].top
+    for t in (t for t in r.taken if t.kind == MODE):
+        crest = mode_top(t.response, t.noise)
+        if crest is None or any(abs(crest.at - p.top.at) <= p.top.width for p in r.peaks):
+            continue
+        if crest.value - 2 * crest.u > best.value + 2 * best.u:
+            text = (f"a bending mode near {crest.at:.5g} Hz has a greater |S|, {crest.value:.2f} ± {2 * crest.u:.2f} between "
+                    "its lines, and was not refined. Name it in modes_hz, with the damping it has.")  # fmt: skip
+            yield Finding("peak-not-refined", text, r.where, Effect.INDETERMINATE, (f"@{r.where}",))
 
 
 def _of_peak(p: Peak, plan: Plan, chance: float) -> Iterator[Finding]:
@@ -230,6 +236,10 @@ def _notes(results: Sequence[Result], plan: Plan) -> Iterator[Finding]:
                      "narrower than its lines stand apart is not seen.")  # fmt: skip
         yield Finding("zone", text, r.where)
         yield from _margins(r)
+        if found := [t.about for t in r.taken if t.kind == MODE and t.about not in plan.modes_hz]:
+            text = (f"Lines were laid near {', '.join(f'{hz:.4g}' for hz in found)} Hz, where the scan shows a bending mode "
+                    "that modes_hz does not name.")  # fmt: skip
+            yield Finding("mode-not-named", text, r.where)
         if r.excluded:
             left = ", ".join(f"{hz:g}" for hz in r.excluded[:12]) + (" and more" if len(r.excluded) > 12 else "")
             yield Finding(

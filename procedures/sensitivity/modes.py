@@ -27,6 +27,7 @@ PLACES = 4  # that are looked at from one line to the next
 CHANCE = 1e-3  # that noise alone asks for lines where no mode is, in an axis: they cost some seconds and change nothing
 MOST = 4  # modes of an axis
 ABOUT = 4  # steps of the scan to either side of a mode
+BESIDE = 2  # steps of the scan that the plan's lines about a mode must reach beyond it: a circle has two sides
 
 
 def unnamed(scans: Sequence[Response], plan: Plan) -> list[Comb]:
@@ -45,7 +46,7 @@ def unnamed(scans: Sequence[Response], plan: Plan) -> list[Comb]:
         at, shape = found
         seen = np.append(seen, at)
         left = left - shape
-        if all(abs(at - mode) > plan.mode_within_hz for mode in plan.modes_hz):
+        if all(abs(at - mode) > plan.mode_within_hz - BESIDE * step for mode in plan.modes_hz):
             fine = max(binary(plan.mode_damping * at), FINEST)
             low = fine * math.floor((at - ABOUT * step) / fine)
             out += combs(low, fine, min(at + ABOUT * step, plan.high_hz), plan.amplitude_A)

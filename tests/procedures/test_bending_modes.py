@@ -14,6 +14,7 @@ from scipy.optimize import brentq
 from bench.analysis.responses import Response
 from bench.cli.motion_truth import truth_of_motion
 from bench.cli.virtual import simulated_run
+from bench.findings import Finding
 from bench.procedure import Measured
 from bench.rigfile import load_rig
 from bench.uncertainty import interval
@@ -82,6 +83,14 @@ def test_no_lines_where_no_mode_is_nor_about_one_that_is_named() -> None:
     assert not unnamed([], PLAN)
 
 
+@pytest.mark.parametrize("at", [674.0, 676.5])
+def test_a_mode_at_the_end_of_the_plan_s_lines_has_lines_beyond_it(at: float) -> None:
+    """They end 26 Hz from 650 Hz, where a circle would be cut in half."""
+    found = unnamed([_read(_rigid(SCANNED) + _mode(SCANNED, at, 0.5, 2e-3), SCANNED, NOISE, 0)], PLAN)
+    assert len(found) == 1
+    assert found[0].hz[-1] > at + 8
+
+
 def test_two_modes_are_two() -> None:
     loop = _rigid(SCANNED) + _mode(SCANNED, 900.0, 0.3, 2e-3) + _mode(SCANNED, 1400.0, 0.4, 2e-3)
     found = unnamed([_read(loop, SCANNED, NOISE, 0)], PLAN)
@@ -122,3 +131,4 @@ def test_a_moved_mode_does_not_hide_from_the_gain_margin(tmp_path: Path, seed: i
     assert true == pytest.approx(gain, rel=5e-3)
     found = next(m for m in run.results if isinstance(m, Measured) and m.quantity.name == "gain_increase")
     assert abs(found.estimate.value - true) < 1.5 * interval(found.estimate).U
+    assert any(isinstance(f, Finding) and f.code == "mode-not-named" for f in run.results)
