@@ -67,7 +67,7 @@ class PlainProgress:
         every = max(1, self._total // PLAIN_LINES)
         if (self._begun - 1) % every == 0:
             left = time_left(self._begun - 1, self._total, self._now() - self._started)
-            self.line(f"step {_count(self._begun, self._total)}: {text}{f', {left}' if left else ''}")
+            self.line(f"step {counted(self._begun, self._total)}: {text}{f', {left}' if left else ''}")
 
     def line(self, text: str) -> None:
         with suppress(OSError, ValueError):  # nobody reads any more; the run goes on
@@ -113,5 +113,6 @@ def shown_on(stream: TextIO) -> Iterator[Progress]:
         bar.stop()
 
 
-def _count(begun: int, total: int) -> str:
-    return f"{begun}/{total}" if total else str(begun)
+def counted(begun: int, total: int) -> str:
+    """How many of them have begun; some runs find more to do than they foresaw."""
+    return f"{begun}/{total}" if begun <= total else str(begun)

@@ -13,6 +13,7 @@ from rich import progress
 from rich.console import Console
 from rich.table import Column
 
+from bench.progress import counted
 from bench.progress_text import columns, time_left, wrapped
 
 BAR, LONGEST_STAGE = 12, 20  # columns
@@ -74,7 +75,7 @@ class TerminalProgress:
     def asking(self, question: str) -> Iterator[None]:
         self.stop()
         with suppress(OSError):
-            self._console.print(f"\n{self._stage} {self._begun}/{self._total}" if self._total else "", highlight=False)
+            self._console.print(f"\n{self._stage} {counted(self._begun, self._total)}" if self._total else "", highlight=False)
             self._console.print(
                 wrapped(question, columns()), markup=False, highlight=False, style="bold", soft_wrap=True
             )
@@ -99,7 +100,7 @@ class TerminalProgress:
 
     def _draw(self, text: str) -> None:
         done = max(0, self._begun - 1)
-        count = f"{self._begun}/{self._total}" if self._total else str(self._begun or "")
+        count = counted(self._begun, self._total) if self._begun or self._total else ""
         left = time_left(done, self._total, time.monotonic() - self._started)
         with suppress(OSError):  # the terminal was closed; the run goes on
             self._bar.update(

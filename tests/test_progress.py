@@ -35,6 +35,16 @@ def test_an_unknown_total_gives_lines_without_a_time() -> None:
     assert stream.getvalue() == "step 1: hang\nstep 2: hang\n"
 
 
+def test_more_steps_than_were_foreseen_are_counted_alone() -> None:
+    """Not as "step 3/2": `sensitivity` finds out while it runs how many peaks it looks at again."""
+    stream = io.StringIO()
+    progress = PlainProgress(stream)
+    progress.total(2)
+    for _ in range(3):
+        progress.step("inject")
+    assert [line.split(":")[0] for line in stream.getvalue().splitlines()] == ["step 1/2", "step 2/2", "step 3"]
+
+
 @pytest.mark.parametrize(("seconds", "text"), [(0.4, "00:00"), (65, "01:05"), (3600 + 61, "1:01:01")])
 def test_times_are_written_as_clocks(seconds: float, text: str) -> None:
     assert clock_text(seconds) == text

@@ -182,7 +182,7 @@ def _covered(r: Result) -> Iterator[Finding]:
 
 
 def _of_modes(r: Result) -> Iterator[Finding]:
-    """No bending mode may have a greater maximum between its lines."""
+    """No bending mode may have a greater maximum between its lines, nor a circle that they do not tell."""
     best = r.peaks[0].top
     for t in (t for t in r.taken if t.kind == MODE):
         crest = mode_top(t.response, t.noise)
@@ -192,6 +192,11 @@ def _of_modes(r: Result) -> Iterator[Finding]:
             text = (f"a bending mode near {crest.at:.5g} Hz has a greater |S|, {crest.value:.2f} ± {2 * crest.u:.2f} between "
                     "its lines, and was not refined. Name it in modes_hz, with the damping it has.")  # fmt: skip
             yield Finding("peak-not-refined", text, r.where, Effect.INDETERMINATE, (f"@{r.where}",))
+    for t in r.hidden:
+        text = (f"lines {t.grid.step:g} Hz apart do not tell the circle of the bending mode near {t.about:.5g} Hz, by which the "
+                "gain may rise less than by the other lines: how far is not told. Give the mode in modes_hz, and in "
+                "mode_damping the damping that it has.")  # fmt: skip
+        yield Finding("mode-not-resolved", text, r.where, Effect.INDETERMINATE, (f"gain_increase@{r.where}",))
 
 
 def _of_peak(p: Peak, plan: Plan, chance: float) -> Iterator[Finding]:

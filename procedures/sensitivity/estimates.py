@@ -12,7 +12,7 @@ import numpy.typing as npt
 from bench.analysis.rational import Rational, Top, averaged, fitted, orders, top
 from bench.analysis.responses import Response, image_distance
 from bench.uncertainty import Estimate, Influence
-from procedures.sensitivity.margins import margins, merged
+from procedures.sensitivity.margins import UNEXPLAINED, hides, margins, merged
 from procedures.sensitivity.steps import HALF, MODE, REFINED, SCAN, SURVEY, WIRING, Taken, name_speed, shared_noise
 
 Array = npt.NDArray[np.float64]
@@ -64,7 +64,8 @@ class Peak:
 
 @dataclass(frozen=True)
 class Result:
-    """One axis at one speed: `curve`, all lines in order; the peaks, the greatest first; estimates by name."""
+    """One axis at one speed: `curve`, all lines in order; the peaks, the greatest first; estimates by name; lines about bending
+    modes that hide how far the gain may rise."""
 
     axis: str
     speed: float
@@ -72,6 +73,7 @@ class Result:
     curve: Response
     peaks: tuple[Peak, ...]
     estimates: Mapping[str, Estimate] = field(repr=False)
+    hidden: tuple[Taken, ...] = ()
 
     @property
     def where(self) -> str:
@@ -157,8 +159,14 @@ def _result(axis: str, speed: float, taken: Sequence[Taken]) -> Result:
             best.top.at, best.top.u_at, "Hz", f"{where}/s_max_hz", "scatter of the peak's place", dof
         )
     wide = [t for t in taken if t.kind == SURVEY or (t.kind == REFINED and t.step_hz == 0)]  # lines of sines are few
-    estimates |= margins(wide, where, [t for t in taken if t.kind == MODE])
-    return Result(axis, speed, tuple(taken), _curve(taken), tuple(found), estimates)
+    modes = [t for t in taken if t.kind == MODE]
+    estimates |= margins(wide, where, modes)
+    hidden: list[Taken] = []
+    if told := estimates.get("gain_increase"):
+        hidden = [t for t in modes if hides(t, 1 / told.value, UNEXPLAINED / len(modes))]
+    if hidden:
+        del estimates["gain_increase"]
+    return Result(axis, speed, tuple(taken), joined_curve(taken), tuple(found), estimates, tuple(hidden))
 
 
 def _typed(value: float, u: float, unit: str, identity: str, name: str, dof: float) -> Estimate:
@@ -188,7 +196,7 @@ def _change(t: Taken, half: Taken, high: npt.NDArray[np.bool_]) -> tuple[float, 
     return float(np.real(b / a - 1).mean()), float(np.sqrt(noise.sum()) / noise.size)
 
 
-def _curve(taken: Sequence[Taken]) -> Response:
+def joined_curve(taken: Sequence[Taken]) -> Response:
     """All lines at the full amplitude; where passes overlap, the finest of them."""
     some = [t for t in taken if t.kind not in (WIRING, HALF)]
     finer: Mapping[str, tuple[str, ...]] = {SURVEY: (SCAN, MODE, REFINED), SCAN: (MODE, REFINED)}

@@ -12,8 +12,8 @@ from bench.analysis.responses import Response, loop
 from bench.figures import Figure, Series
 from bench.uncertainty import interval
 from procedures.sensitivity.checks import ZONES
-from procedures.sensitivity.estimates import Result
-from procedures.sensitivity.steps import SURVEY, name_speed
+from procedures.sensitivity.estimates import Result, joined_curve
+from procedures.sensitivity.steps import SCAN, name_speed
 
 CLEAR = 0.97  # coherence below which a line is not drawn in the Nyquist plot
 
@@ -29,7 +29,7 @@ def all_figures(results: Sequence[Result]) -> Iterator[Figure]:
             yield loop_pictures.nyquist(
                 f"nyquist-{key}",
                 f"Open loop, {name_speed(speed)}",
-                [(r.axis, loop(_survey(r))) for r in some],
+                [(r.axis, loop(_clear(r))) for r in some],
                 ZONES[0],
             )
             yield _coherence(some, key, name_speed(speed))
@@ -56,15 +56,10 @@ def _bode(some: Sequence[Result], key: str, name: str) -> Figure:
                   "frequency (Hz)", "|S| (dB)", size, log_x=True, below=below)  # fmt: skip
 
 
-def _survey(r: Result) -> Response:
-    """The lines of the survey that say something, in order."""
-    some = [t.response for t in r.taken if t.kind == SURVEY]
-    hz = np.concatenate([s.hz for s in some])
-    order = np.argsort(hz)
-    values, covariance, coherence = (
-        np.concatenate([getattr(s, n) for s in some])[order] for n in ("values", "covariance", "coherence")
-    )
-    return Response(hz[order], values, covariance, coherence, some[0].dof).at(coherence > CLEAR)
+def _clear(r: Result) -> Response:
+    """The lines that say something, in order: the survey's, and finer ones where they are, as on the circle of a mode."""
+    curve = joined_curve([t for t in r.taken if t.kind != SCAN])
+    return curve.at(curve.coherence > CLEAR)
 
 
 def _coherence(some: Sequence[Result], key: str, name: str) -> Figure:

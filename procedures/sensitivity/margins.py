@@ -31,6 +31,8 @@ REACHES, DEGREE = (1.8, 1.5, 1.3), 3  # of the crossing's frequency, to either s
 OF_SINES = (3.0, 2.5, 2.1)  # the same where six lines are an octave
 ABOUT = 1.5  # of the frequency where |L| is 1: lines by which single sines' phase margin is told
 MISFIT = 3.0  # standard deviations of its chi-squared over what noise explains: a bending mode is among the lines
+HIDDEN = 4.0  # a circle whose half-power width is less than that share of a step between lines is not looked for
+UNEXPLAINED = 1e-3  # chance that the lines about the modes of an axis are so badly explained by their models, all together
 
 
 def margins(surveys: Sequence[Taken], where: str, modes: Sequence[Taken] = ()) -> dict[str, Estimate]:
@@ -76,11 +78,48 @@ def margins(surveys: Sequence[Taken], where: str, modes: Sequence[Taken] = ()) -
 def of_mode(t: Taken) -> tuple[float, float] | None:
     """|L| where the circle of a bending mode crosses the negative real axis farthest out, and its u, by rational models of
     the lines about it; None where it does not cross there."""
-    r = t.response
-    if r.hz.size < rational.LEAST:
+    if t.response.hz.size < rational.LEAST:
         return None
-    fine = np.linspace(r.hz[0], r.hz[-1], 20 * r.hz.size)
-    return _by_models(rational.orders(r.hz, r.values, t.noise, t.dof), fine, lambda s: 1 / rise(1 / s - 1))
+    return _by_models(_models(t), _fine(t), lambda s: 1 / rise(1 / s - 1))
+
+
+def hides(t: Taken, nearest: float, chance: float) -> bool:
+    """Whether lines about a bending mode hide a circle that may cross the negative real axis farther out than `nearest`, |L|.
+
+    Something is there that no polynomial explains, and either the likeliest model crosses the axis, but how far out is not
+    told from noise; or no model explains the lines (`chance` by which noise alone may ask for more), as where a circle lies
+    between two of them. What is left at the nearer one is then its diameter times its width over twice the distance: a
+    HIDDEN-th of the diameter or more, where the width is at least that share of a step.
+    """
+    r = t.response
+    if r.hz.size < rational.LEAST or _smooth(t) > chance:
+        return False
+    best = _models(t)[0]
+    vague = of_mode(t) is None and 1 / rise(1 / best.at(_fine(t)) - 1) > nearest
+    left = float(np.abs((r.values - best.at(r.hz)) / r.values**2).max())  # of L
+    return vague or (best.probability < chance and HIDDEN * left > nearest)
+
+
+def _smooth(t: Taken) -> float:
+    """The chance that noise alone leaves the lines as far from a polynomial as they are."""
+    from scipy.special import fdtrc
+
+    r, root = t.response, 1 / np.sqrt(t.noise)
+    x = (r.hz - r.hz.mean()) / np.ptp(r.hz)
+    terms, _ = np.linalg.qr(np.vander(x, DEGREE + 1) * root[:, None])
+    z = r.values * root
+    left = 2 * (r.hz.size - DEGREE - 1)
+    chi2 = 2 * float((np.abs(z - terms @ (terms.T @ z)) ** 2).sum())
+    return float(fdtrc(left, max(t.dof, 1.0), chi2 / left)) if left > 0 else 1.0
+
+
+def _models(t: Taken) -> list[rational.Rational]:
+    return rational.orders(t.response.hz, t.response.values, t.noise, t.dof)
+
+
+def _fine(t: Taken) -> Array:
+    """Twenty places for each line."""
+    return np.linspace(t.response.hz[0], t.response.hz[-1], 20 * t.response.hz.size)
 
 
 def merged(parts: Sequence[tuple[Response, Array]]) -> tuple[Array, Complex, Array]:

@@ -35,6 +35,8 @@ PASSAGE = (
 SENSITIVITY = (
     "The loop of another day: an open loop whose gain is 1 % greater, as by the temperature of amplifiers and probes, changes "
     "S by (S - 1) of 1 %, up to 4 % of itself where it is 3.",
+    "A bending mode that the plan does not name and that is damped a quarter as much as its mode_damping or less may be missed "
+    "by the scan: the gain may rise less than is told, 2.5 times where 5 was told.",
 )
 SPINDOWN = (
     "A constant torque that acts against either direction alike, such as a seal or a brake that drags whatever turns the "

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +18,7 @@ from bench.procedure import Measured
 from bench.rigfile import load_rig
 from bench.uncertainty import interval
 from procedures.amb_rotor.conventions import conventions
-from procedures.sensitivity.margins import of_mode
+from procedures.sensitivity.margins import UNEXPLAINED, hides, of_mode, rise
 from procedures.sensitivity.modes import unnamed
 from procedures.sensitivity.plan import Plan
 from procedures.sensitivity.steps import MODE, Grid, Taken
@@ -107,17 +106,49 @@ def test_how_far_a_gain_may_rise_is_told_by_the_mode_s_circle() -> None:
     true = -float(loop(np.array([at]))[0].real)
     assert 0.35 < true < 0.42
     hz, off = np.arange(1302.0, 1335.0, 2.0), []
-    none = np.empty(0)
-    shape = Taken("yi", 0.0, 0.0, MODE, 1319.0, Grid(hz, 0.5, 0.004), _read(loop(hz), hz, 0.01, 0), none, none, 0.0, 0.0,
-                  None, 1e4, 0, 0, 0, 1, conventions(load_rig("amb5dof")))  # fmt: skip
     for seed in range(30):
-        found = of_mode(replace(shape, response=_read(loop(hz), hz, 0.01, seed)))
+        found = of_mode(_taken(loop(hz), hz, 0.01, seed))
         assert found is not None
         off.append((found[0] - true) / found[1])
     assert np.abs(off).max() < 4.0
     assert np.std(off) == pytest.approx(1.0, abs=0.4)
     assert abs(np.mean(off)) < 0.5
-    assert of_mode(replace(shape, response=_read(_rigid(hz), hz, 0.01, 0))) is None  # nothing crosses there
+    assert of_mode(_taken(_rigid(hz), hz, 0.01, 0)) is None  # nothing crosses there
+
+
+def _taken(loop: Complex, hz: Array, noise: float, seed: int) -> Taken:
+    """Lines about a mode near 1320 Hz."""
+    none = np.empty(0)
+    return Taken("yi", 0.0, 0.0, MODE, 1319.0, Grid(hz, 0.5, 0.004), _read(loop, hz, noise, seed), none, none, 0.0, 0.0, None,
+                 1e4, 0, 0, 0, 1, conventions(load_rig("amb5dof")))  # fmt: skip
+
+
+@pytest.mark.parametrize("noise", [0.01, 0.03])
+@pytest.mark.parametrize("damping", [2e-3, 1e-3, 5e-4, 3e-4])
+@pytest.mark.parametrize("gain", [0.3, 0.6])
+def test_a_circle_narrower_than_its_lines_is_told_or_said_to_be_hidden(
+    gain: float, damping: float, noise: float
+) -> None:
+    """Down to a seventh of the damping by which the lines were laid, on a line, near one and between two."""
+    hz = np.arange(1294.0, 1347.0, 2.0)
+    quiet = 0
+    for at in (1319.0, 1320.1, 1320.4):
+        loop = _rigid(hz) + _mode(hz, at, gain, damping)
+        fine = np.linspace(at * (1 - 6 * damping), at * (1 + 6 * damping), 4001)
+        true = 1 / rise(_rigid(fine) + _mode(fine, at, gain, damping))
+        for seed in range(8):
+            taken = _taken(loop, hz, noise, seed)
+            told = of_mode(taken)
+            if told is not None:
+                assert abs(told[0] - true) < 4 * told[1]
+            quiet += told is None and not hides(taken, 0.2, UNEXPLAINED)
+    assert quiet <= 2  # of 24; the narrowest under the greatest noise
+
+
+def test_lines_without_a_circle_hide_none() -> None:
+    hz = np.arange(1294.0, 1347.0, 2.0)
+    for seed in range(40):
+        assert not hides(_taken(_rigid(hz), hz, 0.03, seed), 0.2, UNEXPLAINED)
 
 
 @pytest.mark.long
