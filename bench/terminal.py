@@ -75,7 +75,9 @@ class TerminalProgress:
     def asking(self, question: str) -> Iterator[None]:
         self.stop()
         with suppress(OSError):
-            self._console.print(f"\n{self._stage} {counted(self._begun, self._total)}" if self._total else "", highlight=False)
+            self._console.print(
+                f"\n{self._stage} {counted(self._begun, self._total)}" if self._total else "", highlight=False
+            )
             self._console.print(
                 wrapped(question, columns()), markup=False, highlight=False, style="bold", soft_wrap=True
             )

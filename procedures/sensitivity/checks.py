@@ -193,8 +193,8 @@ def _of_modes(r: Result) -> Iterator[Finding]:
                     "its lines, and was not refined. Name it in modes_hz, with the damping it has.")  # fmt: skip
             yield Finding("peak-not-refined", text, r.where, Effect.INDETERMINATE, (f"@{r.where}",))
     for t in r.hidden:
-        text = (f"lines {t.grid.step:g} Hz apart do not tell the circle of the bending mode near {t.about:.5g} Hz, by which the "
-                "gain may rise less than by the other lines: how far is not told. Give the mode in modes_hz, and in "
+        text = (f"lines {t.grid.step:g} Hz apart do not tell the circle of the bending mode near {t.about:.5g} Hz, by which "
+                "the gain may rise less than by the other lines: how far is not told. Give the mode in modes_hz, and in "
                 "mode_damping the damping that it has.")  # fmt: skip
         yield Finding("mode-not-resolved", text, r.where, Effect.INDETERMINATE, (f"gain_increase@{r.where}",))
 

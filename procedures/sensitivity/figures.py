@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,7 +14,8 @@ from bench.figures import Figure, Series
 from bench.uncertainty import interval
 from procedures.sensitivity.checks import ZONES
 from procedures.sensitivity.estimates import Result, joined_curve
-from procedures.sensitivity.steps import SCAN, name_speed
+from procedures.sensitivity.margins import modelled
+from procedures.sensitivity.steps import MODE, SCAN, name_speed
 
 CLEAR = 0.97  # coherence below which a line is not drawn in the Nyquist plot
 
@@ -26,12 +28,7 @@ def all_figures(results: Sequence[Result]) -> Iterator[Figure]:
             key = f"{speed * 30 / np.pi:.0f}"
             yield _zones(some, key, name_speed(speed))
             yield _bode(some, key, name_speed(speed))
-            yield loop_pictures.nyquist(
-                f"nyquist-{key}",
-                f"Open loop, {name_speed(speed)}",
-                [(r.axis, loop(_clear(r))) for r in some],
-                ZONES[0],
-            )
+            yield _nyquist(some, key, name_speed(speed))
             yield _coherence(some, key, name_speed(speed))
 
 
@@ -56,9 +53,17 @@ def _bode(some: Sequence[Result], key: str, name: str) -> Figure:
                   "frequency (Hz)", "|S| (dB)", size, log_x=True, below=below)  # fmt: skip
 
 
+def _nyquist(some: Sequence[Result], key: str, name: str) -> Figure:
+    curves = [(r.axis, loop(_clear(r))) for r in some]
+    figure = loop_pictures.nyquist(f"nyquist-{key}", f"Open loop, {name}", curves, ZONES[0])
+    if any(t.kind == MODE for r in some for t in r.taken):
+        return replace(figure, caption=f"{figure.caption} Near bending modes: the models of their lines.")
+    return figure
+
+
 def _clear(r: Result) -> Response:
-    """The lines that say something, in order: the survey's, and finer ones where they are, as on the circle of a mode."""
-    curve = joined_curve([t for t in r.taken if t.kind != SCAN])
+    """The lines that say something, in order: the survey's, and the model of those about a mode, on whose circle few lie."""
+    curve = joined_curve([replace(t, response=modelled(t)) if t.kind == MODE else t for t in r.taken if t.kind != SCAN])
     return curve.at(curve.coherence > CLEAR)
 
 

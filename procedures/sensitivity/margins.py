@@ -23,6 +23,7 @@ from procedures.sensitivity.steps import Taken
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 DRAWS = 150
+DRAWN = 4  # points of a curve for each line about a bending mode
 TOLERATED = 0.05  # share of the draws that may have no crossing
 VAGUE = 0.2  # relative standard uncertainty above which a margin is not told
 FAINT = 0.1  # where |L| is less, it is noise that crosses the axis: a gain that may rise tenfold is not told
@@ -32,7 +33,9 @@ OF_SINES = (3.0, 2.5, 2.1)  # the same where six lines are an octave
 ABOUT = 1.5  # of the frequency where |L| is 1: lines by which single sines' phase margin is told
 MISFIT = 3.0  # standard deviations of its chi-squared over what noise explains: a bending mode is among the lines
 HIDDEN = 4.0  # a circle whose half-power width is less than that share of a step between lines is not looked for
-UNEXPLAINED = 1e-3  # chance that the lines about the modes of an axis are so badly explained by their models, all together
+UNEXPLAINED = (
+    1e-3  # chance that the lines about the modes of an axis are so badly explained by their models, all together
+)
 
 
 def margins(surveys: Sequence[Taken], where: str, modes: Sequence[Taken] = ()) -> dict[str, Estimate]:
@@ -98,6 +101,14 @@ def hides(t: Taken, nearest: float, chance: float) -> bool:
     vague = of_mode(t) is None and 1 / rise(1 / best.at(_fine(t)) - 1) > nearest
     left = float(np.abs((r.values - best.at(r.hz)) / r.values**2).max())  # of L
     return vague or (best.probability < chance and HIDDEN * left > nearest)
+
+
+def modelled(t: Taken) -> Response:
+    """Lines about a bending mode as their likeliest model has them, where one explains them: for pictures."""
+    if t.response.hz.size < rational.LEAST or (best := _models(t)[0]).probability < UNEXPLAINED:
+        return t.response
+    fine = np.linspace(t.response.hz[0], t.response.hz[-1], DRAWN * t.response.hz.size)
+    return Response(fine, best.at(fine), np.zeros((fine.size, 2, 2)), np.ones(fine.size), t.response.dof)
 
 
 def _smooth(t: Taken) -> float:
