@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from typing import Protocol, TextIO
 
-from bench.progress_text import PLAIN_WIDTH, time_left, wrapped
+from bench.progress_text import PLAIN_WIDTH, counted, time_left, wrapped
 
 PLAIN_LINES = 20  # about as many lines in a run, however many steps it has
 
@@ -111,8 +111,3 @@ def shown_on(stream: TextIO) -> Iterator[Progress]:
         yield bar
     finally:
         bar.stop()
-
-
-def counted(begun: int, total: int) -> str:
-    """How many of them have begun; some runs find more to do than they foresaw."""
-    return f"{begun}/{total}" if begun <= total else str(begun)

@@ -1,4 +1,4 @@
-"""Words of the progress display: questions broken between words, time left, the width of a terminal."""
+"""Words of the progress display: questions broken between words, how many, time left, the width of a terminal."""
 
 from __future__ import annotations
 
@@ -18,6 +18,11 @@ def wrapped(question: str, width: int) -> str:
 def columns() -> int:
     """Width of the terminal; 80 where it is not told."""
     return shutil.get_terminal_size((PLAIN_WIDTH, 24)).columns
+
+
+def counted(begun: int, total: int) -> str:
+    """How many of them have begun; some runs find more to do than they foresaw."""
+    return f"{begun}/{total}" if begun <= total else str(begun)
 
 
 def time_left(done: int, total: int, seconds: float) -> str:

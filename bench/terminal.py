@@ -13,8 +13,7 @@ from rich import progress
 from rich.console import Console
 from rich.table import Column
 
-from bench.progress import counted
-from bench.progress_text import columns, time_left, wrapped
+from bench.progress_text import columns, counted, time_left, wrapped
 
 BAR, LONGEST_STAGE = 12, 20  # columns
 REDRAWN_HZ = 4.0  # while nothing moves

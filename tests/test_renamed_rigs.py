@@ -105,10 +105,6 @@ def test_no_old_name_is_left(rig: str, tmp_path: Path) -> None:
     [
         ("tsbs12", "spindown", {}),
         ("amb5dof", "tracking", {}),
-        pytest.param("tsbs12", "amb-calibration", {}, marks=LONG),
-        pytest.param("tsbs12", "torque-constant", {}, marks=LONG),
-        pytest.param("tsbs12", "angle-step", {}, marks=LONG),
-        pytest.param("tsbs12", "slew", {}, marks=LONG),
         pytest.param("amb5dof", "bearing-model", {}, marks=LONG),
         pytest.param("amb5dof", "step", {"axes": ["y", "x"]}, marks=LONG),
         pytest.param("amb5dof", "unbalance", ALONE[0], marks=LONG),
@@ -132,20 +128,24 @@ def test_the_numbers_are_the_same(rig: str, procedure: str, plan: Mapping[str, A
 
 CHAIN = ("amb-calibration", "force-constant", "negative-stiffness", "force-coupling", "torque-constant", "angle-step", "slew",
          "spindown", "force-map")  # fmt: skip
+SHORT = {**QUICK, "force-map": {"ramp_A_s": 5.0, "settle_s": 0.3, "average_s": 0.2}}
 
 
-def told(run: Simulated) -> tuple[dict[tuple[str, str], tuple[float, float]], list[str]]:
+Results = tuple[dict[tuple[str, str], tuple[float, float]], list[str]]
+
+
+def told(run: Simulated) -> Results:
     found = {
         (m.quantity.name, m.where): (m.estimate.value, m.estimate.u) for m in run.results if isinstance(m, Measured)
     }
     return found, [f.code for f in run.results if isinstance(f, Finding)]
 
 
-def chained(rig: str, folder: Path, plans: Mapping[str, Mapping[str, Any]] = {}) -> Iterator[tuple[str, Simulated]]:
-    """Runs of the chain, each with the calibrations by those before it; by default plans, but for those of `plans`."""
+def chained(rig: str, folder: Path) -> Iterator[tuple[str, Simulated]]:
+    """Runs of the chain by short plans, each with the calibrations by those before it."""
     known: dict[str, Calibration] = {}
     for procedure in CHAIN:
-        plan, path = plans.get(procedure, {}), folder / f"{procedure}.mcap"
+        plan, path = SHORT.get(procedure, {}), folder / f"{procedure}.mcap"
         run = simulated_run(procedure, rig, 1, plan, path, calibrations=known)
         yield procedure, run
         known[procedure] = run.calibration()
@@ -190,32 +190,35 @@ def test_the_same_samples_come_by_another_map(tmp_path: Path) -> None:
             np.testing.assert_array_equal(here[ours], there[theirs], err_msg=f"{ours}, {theirs}")
 
 
-@LONG
-@pytest.mark.timeout(900)
-def test_the_servomotor_elsewhere_has_the_same_numbers(tmp_path: Path) -> None:
-    """Telemetry in one message and a reply to everything: the same samples at the same times, to the last digit."""
-    folders = [tmp_path / "here", tmp_path / "there"]
-    for folder in folders:
-        folder.mkdir()
-    rigs = "tsbs12", elsewhere(tmp_path, replies=True)
-    runs = [chained(rig, folder) for rig, folder in zip(rigs, folders, strict=True)]
-    for (procedure, here), (_, there) in zip(*runs, strict=True):
-        assert told(here)[0], procedure
-        assert told(here) == told(there), procedure
+@pytest.fixture(scope="module")
+def here(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[str, Results]]:
+    """The chain on the servomotor as it ships."""
+    return [(procedure, told(run)) for procedure, run in chained("tsbs12", tmp_path_factory.mktemp("here"))]
 
 
 @LONG
 @pytest.mark.timeout(900)
-def test_without_replies_the_numbers_are_those_of_other_noise(tmp_path: Path) -> None:
+@pytest.mark.xdist_group("servomotor elsewhere")
+def test_the_servomotor_elsewhere_has_the_same_numbers(tmp_path: Path, here: list[tuple[str, Results]]) -> None:
+    """Telemetry in one message and a reply to everything: the same samples at the same times, the same numbers to the last
+    digit; shares of a budget are summed up in the order of their names, so that u is to 1e-12."""
+    for (procedure, ours), (_, there) in zip(here, chained(elsewhere(tmp_path, replies=True), tmp_path), strict=True):
+        (values, found), (others, also) = ours, told(there)
+        assert values, procedure
+        assert {name: v for name, (v, _) in values.items()} == {name: v for name, (v, _) in others.items()}, procedure
+        assert [u for _, u in others.values()] == pytest.approx([u for _, u in values.values()], rel=1e-12), procedure
+        assert found == also, procedure
+
+
+@LONG
+@pytest.mark.timeout(900)
+@pytest.mark.xdist_group("servomotor elsewhere")
+def test_without_replies_the_numbers_are_those_of_other_noise(tmp_path: Path, here: list[tuple[str, Results]]) -> None:
     """Levels and signals are not answered, and a sample in two messages is complete a frame later: the same machine is seen
     at other times, so that values differ as two results of one machine may."""
-    folders = [tmp_path / "here", tmp_path / "there"]
-    for folder in folders:
-        folder.mkdir()
-    rigs = "tsbs12", elsewhere(tmp_path, replies=False)
-    runs = [chained(rig, folder, QUICK) for rig, folder in zip(rigs, folders, strict=True)]
-    for (procedure, here), (_, there) in zip(*runs, strict=True):
-        (ours, found), (theirs, also) = told(here), told(there)
+    runs = chained(elsewhere(tmp_path, replies=False), tmp_path)
+    for (procedure, (ours, found)), (_, there) in zip(here, runs, strict=True):
+        theirs, also = told(there)
         assert set(ours) == set(theirs), procedure
         assert sorted(found) == sorted(also), procedure
         for name, (value, u) in ours.items():
