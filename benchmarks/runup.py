@@ -82,10 +82,14 @@ def whole_run(out: Path, parts: Parts) -> Path:
     runner.evaluate = parts.timed("analysis", runner.evaluate)  # type: ignore[attr-defined]
     job, connect = compose.prepare(compose.Request("run-up", "amb5dof", seed=1, plan=PLAN, out=out))
     drawn = job.procedure.figures
-    job = replace(job, procedure=replace(job.procedure, figures=parts.timed("figures", lambda r: list(drawn(r)))))
+    job = replace(job, procedure=replace(job.procedure, figures=parts.timed("figures", lambda *of: list(drawn(*of)))))
     with Supervisor().watching() as watching:
         report = parts.timed("report", reporting.build)
-        return runner.run(job, out, connect, watching, PlainProgress(sys.stderr), report).directory
+        result = runner.run(job, out, connect, watching, PlainProgress(sys.stderr), report)
+    for finding in result.record.findings:
+        if finding.code == "report-failed":
+            raise SystemExit(f"no report to measure: {finding.text}")
+    return result.directory
 
 
 def main() -> int:

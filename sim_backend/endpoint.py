@@ -154,14 +154,16 @@ class InProcessLink:
 
     def _beats(self, begin_ns: int, end_ns: int) -> FrameBatch:
         """The heartbeats of a slice, while the lease lasts."""
-        beats = []
-        while self._next_beat < end_ns:
-            if begin_ns <= self._next_beat <= self._lease_until and not self._dead:
-                self._counter += 1
-                payload = self._beat.copy()
-                put(payload, self._count_at, np.array([self._counter], np.uint64))
-                beats.append(
-                    packed(self._heartbeat.identifier, payload.tobytes(), t_ns=self._next_beat, flags=self._flags)
-                )
-            self._next_beat += self._period_ns
-        return batch_of(beats)
+        due = range(self._next_beat, end_ns, self._period_ns)
+        self._next_beat += len(due) * self._period_ns
+        times = [t for t in due if begin_ns <= t <= self._lease_until and not self._dead]
+        if not times:
+            return empty_batch()
+        payloads = np.tile(self._beat, (len(times), 1))
+        put(payloads, self._count_at, np.arange(len(times), dtype=np.uint64) + np.uint64(self._counter + 1))
+        self._counter += len(times)
+        identifier, flags = self._heartbeat.identifier, self._flags
+        return batch_of(
+            packed(identifier, payload.tobytes(), t_ns=t, flags=flags)
+            for t, payload in zip(times, payloads, strict=True)
+        )

@@ -28,19 +28,24 @@ def expanded(model: Model, units: Mapping[str, float], deviations: Deviations) -
         units: standard uncertainty of each influence, by id.
         deviations: drawn deviations (n,) by id.
     """
-    z = {key: deviations[key] / u for key, u in units.items()}
-    middle, out = model({}), np.zeros(len(next(iter(z.values()))))
+    middle, out = model({}), np.zeros(len(next(iter(deviations.values()))))
     weights: dict[str, float] = {}
-    for key, shift in z.items():
+    shift = np.empty_like(out)  # one at a time: hundreds of influences with a million draws each are gigabytes
+    for key, u in units.items():
+        np.divide(deviations[key], u, out=shift)
         up, down = model({key: 1.0}), model({key: -1.0})
         slope, bend = (up - down) / 2, up - 2 * middle + down
-        out += middle / len(z) + slope * shift + bend / 2 * shift**2
+        out += middle / len(units) + slope * shift + bend / 2 * shift**2
         weights[key] = abs(slope) + abs(bend)
     strongest = sorted(weights, key=lambda key: -weights[key])[:MOST]
+    z = {key: deviations[key] / units[key] for key in strongest}
     for a, b in combinations(strongest, 2):
         corners = (s * t * model({a: s, b: t}) for s in (1.0, -1.0) for t in (1.0, -1.0))
         out += sum(corners) / 4 * z[a] * z[b]
-    asked = np.array([model({key: float(shift[k]) for key, shift in z.items()}) for k in range(min(CHECKED, len(out)))])
+    first = {key: deviations[key][:CHECKED] / u for key, u in units.items()}
+    asked = np.array(
+        [model({key: float(drawn[k]) for key, drawn in first.items()}) for k in range(min(CHECKED, len(out)))]
+    )
     apart, scale = np.abs(out[: len(asked)] - asked), float(out.std())
     if np.sqrt(np.mean(apart**2)) > AGREES * scale or apart.max() > NEVER * scale:
         return None
