@@ -79,7 +79,8 @@ def of_law(around: Sequence[Around], plan: Plan, model: Mapping[str, float], pol
         yield Finding(
             "torque-reversed",
             f"gamma went to {math.degrees(furthest):.2f}°, and beyond {90 / poles:.2f}° the motor's torque acts the other way: "
-            "only friction held the rotor's angle there.", "gamma", Effect.INDETERMINATE,
+            f"the rotor turned by up to {math.degrees(max(a.turned for a in balanced)):.3g}° before gamma came back.",
+            "gamma", Effect.INDETERMINATE,
         )  # fmt: skip
     yield from _observed(balanced, model, poles)
 

@@ -208,7 +208,8 @@ def _of_group(t: Turns, plan: Plan, given: Mapping[str, Estimate]) -> dict[str, 
         scale = (1 / given["gain_xo"] + 1 / given["gain_yo"]) / 2
         out[f"error_radius/{when}"] = scale * Estimate.exact(found[f"error_radius/{when}"], "m")
     out["unbalance_ratio"] = out["unbalance/after"] / out["unbalance/before"]
-    out["gamma_extreme"] = Estimate.of(found["gamma_extreme"], _between(t))
+    reading = Estimate.of(found["gamma_extreme"], _between(t))
+    out["gamma_extreme"] = reading if at_bound(t) else reading + ripple * fit.follows(found["gamma_extreme"], values)
     return out
 
 
@@ -223,8 +224,13 @@ def _ripple(plan: Plan, pole_pairs: float) -> Influence:
 def _between(t: Turns) -> Influence:
     """What a reading leaves open of gamma: in each tick it takes a step of its slew up or down, and a capture that reads every
     tenth tick may see always the upper or the lower one. At its bound it stands: single precision is left."""
-    half = 1e-8 if np.abs(t.gamma.mean(axis=0)).max() > 0.9999 * t.law.limit else t.law.slew * t.tick_s / 2
+    half = 1e-8 if at_bound(t) else t.law.slew * t.tick_s / 2
     return Influence("resolution/gamma", "steps of the slew", half / math.sqrt(3), "rad", "B", "rectangular")
+
+
+def at_bound(t: Turns) -> bool:
+    """gamma stood at its bound."""
+    return float(np.abs(t.gamma.mean(axis=0)).max()) > 0.9999 * t.law.limit
 
 
 def paired(given: Mapping[str, Estimate]) -> tuple[Estimate, ...]:

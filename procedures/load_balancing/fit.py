@@ -18,7 +18,7 @@ Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 NEAR = 0.02  # of a turn to either side of a peak, through which a parabola is laid
 AGAIN = 200  # draws of the turns
-ORDERS = 4  # harmonics of the circle that the deviation from it is looked at with
+ORDERS = 2  # harmonics of the circle that the deviation from it is looked at with
 Numbers = Mapping[str, float]
 
 
@@ -71,6 +71,12 @@ def load(read: Complex, gamma: Array | float, p: Numbers) -> Complex:
     """Load on the motor (n,) N: what its force holds."""
     out: Complex = -p["alpha_d"] * factor(gamma, p) * acting(true(read, p), p)
     return out
+
+
+def follows(gamma: float, p: Numbers) -> float:
+    """By how much gamma goes, rad, for a load that turns by a radian: tan M g = r tan phi, T (6.27)."""
+    angle = p["pole_pairs"] * (gamma - p["gamma_0"])
+    return (p["ratio"] * math.cos(angle) ** 2 + math.sin(angle) ** 2 / p["ratio"]) / p["pole_pairs"]
 
 
 def balanced(d: Complex, law: Law, p: Numbers) -> Balanced:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
-from bench.rigfile.roles import STATUS
+from bench.rigfile.roles import ANGLE, STATUS
 from procedures.load_balancing.plan import Plan
 from procedures.servomotor.conventions import LOADS, PHASE, Servomotor, conventions
 
@@ -25,8 +25,8 @@ class Around:
     """The turns of one step. By turn and by bins of the circle's phase: `segments` (turns, bins, 4) A as their sensors read,
     `path` (turns, bins) m, horizontal + j up, at the outboard sensors, and its `distance` from their zero (a chord is nearer
     than its arc, by 1 nm in 10 ms); with balancing, from the capture, `gamma` (turns, bins) rad, `observed` (turns, bins) N,
-    the load as the controller has it, and `fastest` rad/s, of the phase angle, and the controller's tick, s. Then its
-    flags ORed, what stood still, and lost samples."""
+    the load as the controller has it, and `fastest` rad/s, of the phase angle, and the controller's tick, s. Then how
+    far the rotor `turned` within the step, rad, its flags ORed, what stood still, and lost samples."""
 
     when: str
     way: str
@@ -38,6 +38,7 @@ class Around:
     observed: Complex | None
     fastest: float
     tick_s: float
+    turned: float
     flags: int
     stuck: tuple[str, ...]
     lost: int
@@ -62,7 +63,7 @@ def positions(machine: Servomotor) -> tuple[str, ...]:
 
 def channels(machine: Servomotor) -> tuple[str, ...]:
     """What is recorded of a turn."""
-    return (*positions(machine), *machine.segments, STATUS)
+    return (*positions(machine), *machine.segments, ANGLE, STATUS)
 
 
 def mean_currents(segments: Array) -> Complex:
@@ -110,7 +111,8 @@ def _read(recording: Recording[Plan], step: Step) -> Around:
     flags = data[STATUS].astype(np.int64)
     return Around(
         str(labels["when"]), str(labels["way"]), int(labels["repeat"]), folded[..., :4], folded[..., 4] + 1j * folded[..., 5],
-        folded[..., 6], gamma, observed, fastest, tick_s, int(np.bitwise_or.reduce(flags)),
+        folded[..., 6], gamma, observed, fastest, tick_s, float(np.ptp(np.unwrap(data[ANGLE]))),
+        int(np.bitwise_or.reduce(flags)),
         tuple(c for c in (*positions(machine), *machine.segments) if np.ptp(data[c]) == 0), step.lost(), step.expected(),
     )  # fmt: skip
 

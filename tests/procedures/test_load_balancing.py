@@ -12,6 +12,7 @@ from balancing import codes, run, values
 from bench.cli.loading import load_procedure
 from bench.cli.motion_truth import truth_of_motion
 from bench.errors import InterlockError
+from bench.findings import Finding
 from bench.rigfile import load_rig
 from bench.uncertainty import interval
 from procedures.load_balancing import fit
@@ -121,10 +122,27 @@ def test_a_bound_of_12_degrees_ends_in_a_trip_where_no_friction_holds_the_angle(
         run("tsbs12", 1, tmp_path, BEYOND, truth)
 
 
-def test_a_bound_of_12_degrees_is_told_where_friction_holds_the_angle(tmp_path: Path) -> None:
-    """15 N m/rad times a count of 1.5 mrad is 0.02 N m, less than the Coulomb torque of 0.05 N m."""
+def test_a_bound_of_12_degrees_trips_the_nominal_machine_where_gamma_stays_long(tmp_path: Path) -> None:
+    with pytest.raises(InterlockError, match="speed reached"):
+        run("tsbs12", 1, tmp_path, {**BEYOND, "circle_hz": 0.1}, nominal(load_rig("tsbs12")))
+
+
+def test_where_gamma_is_back_in_time_the_run_says_how_far_the_rotor_turned(tmp_path: Path) -> None:
+    """Half a second beyond 11.25 degrees at a turn in 4 s."""
     truth = {**nominal(load_rig("tsbs12")), "motor_offset_x": 5e-6}
-    assert "torque-reversed" in codes(run("tsbs12", 1, tmp_path, BEYOND, truth))
+    done = run("tsbs12", 1, tmp_path, BEYOND, truth)
+    (told,) = [r.text for r in done.results if isinstance(r, Finding) and r.code == "torque-reversed"]
+    turned = float(told.split("turned by up to ")[1].split("°")[0])
+    assert turned > 30
+
+
+def test_gamma_follows_a_load_that_turns() -> None:
+    """By the law itself, on both sides of where alpha_d and alpha_c are alike."""
+    p = P | {"gamma_0": 0.002}
+    for across in (-20.0, 5.0, 22.0):
+        load = np.asarray([across - 48.55j], np.complex128)
+        gamma = [float(fit.balanced(load * np.exp(1j * x), NO_BOUND, p).gamma[0]) for x in (-1e-5, 0.0, 1e-5)]
+        assert abs(gamma[2] - gamma[0]) / 2e-5 == pytest.approx(fit.follows(gamma[1], p), rel=1e-6)
 
 
 def check(**changes: object) -> list[str]:

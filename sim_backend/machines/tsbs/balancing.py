@@ -1,8 +1,8 @@
 """Load balancing on a circle (T 6.7.3): what the drawn machine does in the mean, and what its own constants say it should.
 
-The machine runs with the noise of its position sensors: gamma follows a noisy load by a slew, and so lags behind more than
-without. Means over TURNS leave little of it. The shaft stands at its home angle. The load on the motor is D, N, horizontal + j
-up; currents are those along the field.
+The machine runs with noise of its position sensors, another than that of the run: gamma follows a noisy load by a slew, and so
+lags behind more than without. Means over TURNS leave little of it. The shaft stands at its home angle. The load on the motor is
+D, N, horizontal + j up; currents are those along the field.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import numpy.typing as npt
 from bench.rigfile import RigFile
 from sim_backend.controller.controls import controls, in_force
 from sim_backend.core.plant import LEVITATE, LIFT, PERIOD_TICKS, READY, TICK_S
+from sim_backend.draws import noise_seed
 from sim_backend.machine import Numbers, Truth
 from sim_backend.machines.tsbs.params import ControlParams, PlantParams
 from sim_backend.machines.tsbs.plant import CHANNELS, TRACE, Plant
@@ -29,7 +30,8 @@ AT = {name: k for k, name in enumerate(CHANNELS)}
 GAMMA = TRACE.index("gamma")
 MEAN = 10  # ms of which means are taken around the circle
 TURNS = 32
-NEAR, ORDERS = 8, 4  # means to either side of a peak, through which a parabola is laid; harmonics of the path
+NEAR, ORDERS = 8, 2  # means to either side of a peak, through which a parabola is laid; harmonics of the path
+NEVER = -1  # a visit that no run is of: its noise is the truth's own
 FIXED = 4  # rounds for the direction of balanced currents, which sensors' zeros turn by a thousandth
 
 
@@ -85,7 +87,7 @@ def _levitated(rig: RigFile, drawn: Truth, p: PlantParams, settings: Numbers) ->
     used = in_force(rig, drawn.machine, settings)
     known = {f.name for f in fields(ControlParams)} & set(used)
     control = ControlParams(**{name: used[name] * drawn.defects.get(f"factor_{name}", 1.0) for name in known})
-    plant = Plant(p, control=control)
+    plant = Plant(p, noise_seed(drawn.seed, NEVER), control=control)
     plant.mode = READY
     plant.run(1000)
     plant.mode = LIFT
