@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from bench.analysis.criticals import CERTAIN
 from bench.analysis.peaks import WINDOW
 from bench.findings import Effect, Finding
 from bench.recording import Recording
@@ -218,6 +219,11 @@ def _criticals(run: Run, plan: Passing) -> Iterator[Finding]:
         text = (f"no critical speed between {speed[0]:.0f} and {speed[-1]:.0f} r/min: no greatest amplitude of any probe has "
                 f"an amplification factor of {DAMPED} or more.")  # fmt: skip
         yield Finding("no-critical", text, run.passage.name)
+    bumps = [f"{axis} at {' and '.join(f'{w * RPM:.0f}' for w in at)} r/min" for axis, at in run.bumps.items() if at]
+    if bumps:
+        text = (f"bumps that stand out by less than {CERTAIN} standard deviations of their noise, which may have made them: "
+                f"{', '.join(bumps)}. Nothing is told of them; a slower passage would tell.")  # fmt: skip
+        yield Finding("peak-in-noise", text, run.passage.name)
     for p in run.peaks:
         if p.factor is None:
             text = (f"the greatest amplitude of {p.axis} at {_rpm(p)} does not fall to 0.707 of itself on both sides "

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.analysis import transient
-from bench.analysis.criticals import Critical, criticals, moved
+from bench.analysis.criticals import Critical, moved
 from bench.analysis.peaks import Smoother
 from bench.analysis.vectors import complexes, estimates, parts
 from bench.recording import Recording
@@ -19,7 +19,7 @@ from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
 from bench.uncertainty.estimate import merged
 from procedures.run_up import linear_model
-from procedures.run_up.line import DRAWS, Line
+from procedures.run_up.line import Line
 from procedures.run_up.plan import Passing
 from procedures.run_up.steps import Curve, Passage, curve, near
 from procedures.synchronous import bearings, facts, identified
@@ -77,8 +77,9 @@ class Peak:
 
 @dataclass(frozen=True)
 class Run:
-    """A passage with its curve; `shaft` (4, b) vectors of the shaft's centre, lag taken off; `peaks` of all probes; what the
-    turns about the captures' speeds say, None where none was passed; what is `known` of the bearings."""
+    """A passage with its curve; `shaft` (4, b) vectors of the shaft's centre, lag taken off; `peaks` of all probes, and the
+    speeds rad/s, by axis, of `bumps` that noise may have made; what the turns about the captures' speeds say, None where none
+    was passed; what is `known` of the bearings."""
 
     passage: Passage
     curve: Curve
@@ -88,6 +89,7 @@ class Run:
     slow: Dwell | None
     known: bearings.Known
     clearance: float = field(default=math.nan)
+    bumps: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
 
 def run(passage: Passage, slow: Dwell | None, recording: Recording[Any], plan: Passing, known: bearings.Known) -> Run:
@@ -109,13 +111,18 @@ def run(passage: Passage, slow: Dwell | None, recording: Recording[Any], plan: P
     results = replace(results, dwells=tuple(_with(r, rest) for r, rest in zip(results.dwells, left, strict=True)))
     inputs = bearings.collect_inputs(rig, known)
     large = _large(found, inputs, results.runouts, plan.law, gains(rig, plan))
-    shaft, peaks = [], []
+    shaft, peaks, bumps = [], [], {}
     for k, axis in enumerate(passage.machine.axes):
         line = Line(found, k, axis, inputs[f"gain_{k}"].value, results.runouts[1.0])
         series = line.series()
         shaft.append(series[-1])
-        peaks += _peaks(line, series, {name: bent[k] for name, bent in large.items()}, inputs, plan.running_rad_s)
-    return Run(passage, found, np.array(shaft), tuple(peaks), results, slow, known, clearance)
+        told = line.criticals(series[-1] - large[""][k])
+        certain = [c for c in told if c.certain]
+        bumps[axis] = tuple(c.speed for c in told if not c.certain)
+        peaks += _peaks(
+            line, certain, series, {name: bent[k] for name, bent in large.items()}, inputs, plan.running_rad_s
+        )
+    return Run(passage, found, np.array(shaft), tuple(peaks), results, slow, known, clearance, bumps)
 
 
 def bending(inputs: Mapping[str, Estimate]) -> tuple[str, ...]:
@@ -141,11 +148,16 @@ def _large(
 
 
 def _peaks(
-    line: Line, series: Sequence[Complex], large: Mapping[str, Complex], inputs: Mapping[str, Estimate], running: float
+    line: Line,
+    found: Sequence[Critical],
+    series: Sequence[Complex],
+    large: Mapping[str, Complex],
+    inputs: Mapping[str, Estimate],
+    running: float,
 ) -> list[Peak]:
-    """Of small orbits, with the influences of the scatter, of the runout, of the probe's gain, of what the bearings' bend rests
-    on, and of what is left of the lag and of that bend: no more than what the last term of the one and the second harmonics in
-    the other change. The amplitude is that of the orbit as it was."""
+    """What was found of small orbits, with the influences of the scatter, of the runout, of the probe's gain, of what the
+    bearings' bend rests on, and of what is left of the lag and of that bend: no more than what the last term of the one and the
+    second harmonics in the other change. The amplitude is that of the orbit as it was."""
     axis, gain, out = line.axis, inputs[f"gain_{line.k}"], []
     raw, once, best = (z - large[""] for z in series)
     runout = [
@@ -155,12 +167,9 @@ def _peaks(
     others = [series[-1], raw, once, series[-1] - large[HARMONICS]]
     others += [*(best - u for _, u in runout), *(series[-1] - large[name] for name in bending(inputs))]
     speeds = line.found.speed
-    scatter = line.scatter()
-    each = parts(scatter[..., None])
-    covariance = np.einsum("nbi,nbj->bij", each, each) / DRAWS
-    for number, c in enumerate(criticals(speeds, best, covariance, scatter=scatter), 1):
+    for number, c in enumerate(found, 1):
         where = f"{axis}/{number}"
-        (as_it_was, before, lag, bend, *shifts) = moved(speeds, best, others, covariance, c)[1]
+        (as_it_was, before, lag, bend, *shifts) = moved(speeds, best, others, line.spread, c)[1]
         slopes = [(part, shift / part.u) for part, shift in zip(parts_, shifts, strict=True) if part.u]
         numbers = {"speed": c.speed, "amplitude": c.amplitude + float(as_it_was[1]), "factor": c.factor}
         made, scattered = {}, scatter_of(c, where, line.dof(c.speed))

@@ -9,7 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.analysis import transient
+from bench.analysis.criticals import Critical, criticals
 from bench.analysis.peaks import WINDOW, Smoother, noise, pooled_covariance
+from bench.analysis.vectors import parts
 from procedures.run_up.steps import Curve
 from procedures.synchronous.estimates import Runout
 
@@ -33,6 +35,11 @@ class Line:
         """As measured, then with the lag taken off by one term and by two."""
         return self._settled(self._raw)
 
+    def criticals(self, values: Complex) -> list[Critical]:
+        """Of `values` (b,) m, the series with something taken off that has no noise."""
+        return criticals(self.found.speed, values, self.spread, scatter=self.scatter)
+
+    @cached_property
     def scatter(self) -> Complex:
         """Of the last of these, drawn (DRAWS, b): what takes the lag off adds to the noise, and makes neighbours alike.
 
@@ -43,6 +50,12 @@ class Line:
         off = noise(pooled_covariance(self._covariance), 0, DRAWS)
         off *= np.sqrt(np.maximum(self._smooth.excess(self._raw, lines + off[:USUAL]), 1.0))
         return np.asarray(self._settled(lines + off)[-1] - self._settled(lines)[-1])
+
+    @cached_property
+    def spread(self) -> Array:
+        """Covariances (b, 2, 2) of that."""
+        each = parts(self.scatter[..., None])
+        return np.asarray(np.einsum("nbi,nbj->bij", each, each) / DRAWS)
 
     def dof(self, speed: float) -> float:
         """Of what the drawn noise says of a critical at `speed`: the model there takes a window of blocks, the covariance of

@@ -64,6 +64,20 @@ def test_a_curve_in_much_noise_gives_criticals_or_none(seed: int) -> None:
     assert all(not np.isfinite(c.factor) or c.high > c.low for c in found)
 
 
+def test_bumps_that_noise_makes_are_not_certain_and_a_peak_in_the_same_noise_is() -> None:
+    """Noise of a fifth of a flat response, and of a tenth of a resonance's greatest amplitude."""
+    w = np.linspace(70, 565, 112)
+    for seed in range(20):
+        off = np.random.default_rng([5, seed]).normal(0, 1, (w.size, 2)).view(np.complex128)[:, 0]
+        flat, sharp = 1 + w / 565, response(w * 3, 0.06)
+        bumps = criticals(w, flat + 0.2 * off, np.tile(0.04 * np.eye(2), (w.size, 1, 1)), draws=60, seed=seed)
+        assert not any(c.certain for c in bumps), [c.clear for c in bumps]
+        u = 0.1 * np.abs(sharp).max()
+        found = criticals(w, sharp + u * off, np.tile(u**2 * np.eye(2), (w.size, 1, 1)), draws=60, seed=seed)
+        (true,) = [c for c in found if c.certain]
+        assert true.speed == pytest.approx(closed_form(0.06)[0] / 3, rel=0.05)
+
+
 @pytest.mark.parametrize("told", [1.0, 1.5])
 def test_blocks_that_scatter_more_than_they_are_said_to_are_seen(told: float) -> None:
     """Ratio of the mean squares, of a curve with noise `told` times as large as its covariance says."""
