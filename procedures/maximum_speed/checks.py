@@ -16,7 +16,7 @@ from bench.uncertainty import Estimate, interval
 from bench.units import RPM
 from procedures.maximum_speed.estimates import Result
 from procedures.maximum_speed.plan import HALF, OP, Plan
-from procedures.maximum_speed.steps import GUARDED, NOT_CARRIED, UNSTEADY, Window
+from procedures.maximum_speed.steps import CARRIED_A, GUARDED, NOT_CARRIED, SET_POINT, UNSTEADY, Window
 from procedures.servomotor.checks import idle
 from procedures.servomotor.conventions import Servomotor
 from procedures.shared import signals
@@ -45,6 +45,14 @@ def of_events(recording: Recording[Plan]) -> Iterator[Finding]:
     for event in recording.events(UNSTEADY):
         text = f"the speed still changes by {event['change']:.2%} from one second to the next after {event['waited']:.0f} s."
         yield Finding("unsteady", text, f"{event['sharing']}", Effect.INDETERMINATE)
+    wanted = recording.plan.carried_A
+    for event in recording.events(SET_POINT):
+        if wanted and event["i_y"] > wanted + CARRIED_A:
+            yield Finding(
+                "carried-more",
+                f"the set point goes no further than {event['at'] * 1e6:.0f} µm, where i_y is {event['i_y']:.2f} A; "
+                f"{wanted:.2f} A was asked for. The speeds are those with {event['i_y']:.2f} A.", "set point",
+            )  # fmt: skip
     for event in recording.events(NOT_CARRIED):
         yield Finding(
             "not-carried",

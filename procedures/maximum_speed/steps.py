@@ -19,6 +19,7 @@ from procedures.servomotor.conventions import Servomotor, conventions
 
 Array = npt.NDArray[np.float64]
 RUN = "run"
+CARRIED_A = 0.05  # near enough to the i_y that was asked for
 GUARDED, UNSTEADY, NOT_CARRIED, SET_POINT = "guarded", "unsteady", "not-carried", "set-point"
 SHARED = "sharing"  # event: the segments are shared another way from now on
 """Events: the rotor reached the speed that guards the run; its speed did not become steady; no set point makes the motor carry

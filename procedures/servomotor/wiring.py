@@ -15,6 +15,7 @@ from bench.rigfile.roles import ANGLE
 from procedures.servomotor import hold, leaning
 from procedures.servomotor.conventions import Servomotor, conventions
 from procedures.servomotor.parameters import stated, write
+from procedures.shared import first_look
 
 NEEDED = ("motor.across", "motor.along")
 NUDGE_A, NUDGE_S = 1.0, 0.3
@@ -76,13 +77,14 @@ def _along(own: float, across: float) -> bool:
 
 
 def _nudged(rig: Rig, record: Recorder, i_x: float, i_y: float) -> tuple[float, float]:
-    """The outboard AMB's control currents across and along the motor's first segment, A, with open-loop currents in it."""
+    """The outboard AMB's control currents across and along the motor's first segment, A, with open-loop currents in it: means,
+    for noise makes single readings of a sound motor look like a push the other way."""
     write(rig, {"motor.across": i_x, "motor.along": i_y})
     rig.clock.sleep(_ramp_s(rig) + NUDGE_S)
+    machine = conventions(rig.file)
     with record.step("nudge", i_x_A=i_x, i_y_A=i_y):
-        rig.clock.sleep(NUDGE_S)
-    machine, at = conventions(rig.file), rig.levitation.reading
-    return machine.pushed(machine.control("xo", at), machine.control("yo", at))
+        seen = first_look.watched(rig, record, machine.coils_of("xo", "yo"), NUDGE_S)
+    return machine.pushed(machine.control("xo", seen.__getitem__), machine.control("yo", seen.__getitem__))
 
 
 def _ramp_s(rig: Rig) -> float:
