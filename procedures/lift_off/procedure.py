@@ -38,12 +38,23 @@ GAMMA_LIFT = Quantity(
     "gamma_lift",
     "rad",
     "half the difference of the phase angles, above and below, from which on the motor lifts its end",
+    title="phase angle of lift-off",
 )
 PREDICTED = Quantity(
-    "gamma_predicted", "rad", "the same by statics, from the motor's constants as other procedures found them"
+    "gamma_predicted",
+    "rad",
+    "the same by statics, from the motor's constants as other procedures found them",
+    title="phase angle of lift-off, predicted",
 )
-GAMMA_ZERO = Quantity("gamma_zero", "rad", "middle of both phase angles: zero of the commutation, and the load across")
-REST_DEPTH = Quantity("rest_depth", "m", "how deep the outboard end lies on its ring, under the probe's zero")
+GAMMA_ZERO = Quantity(
+    "gamma_zero",
+    "rad",
+    "middle of both phase angles: zero of the commutation, and the load across",
+    title="middle of the phase angles",
+)
+REST_DEPTH = Quantity(
+    "rest_depth", "m", "how deep the outboard end lies on its ring, under the probe's zero", title="depth at rest"
+)
 MEASURES = (GAMMA_LIFT, PREDICTED, GAMMA_ZERO, REST_DEPTH)
 GEOMETRY = ("clearance", "com_to_inboard_amb", "com_to_inboard_sensor", "com_to_motor", "com_to_outboard_amb",
             "com_to_outboard_sensor", "motor_to_outboard_amb")  # fmt: skip

@@ -42,9 +42,14 @@ REDUCTION = Quantity("reduction", "1", "largest |i_y| with balancing over that w
 PREDICTED = Quantity("predicted_reduction", "1", "the same by the quasi-static formula, before balancing begins")
 UNBALANCE = Quantity("unbalance", "1", "rms of |i_x| - |i_y| over rms of |i_x| + |i_y|")
 RATIO = Quantity("unbalance_ratio", "1", "unbalance with balancing over that without")
-GAMMA = Quantity("gamma_extreme", "rad", "greatest size of the phase angle while it balances")
+GAMMA = Quantity(
+    "gamma_extreme", "rad", "greatest size of the phase angle while it balances", title="largest phase angle"
+)
 ERROR = Quantity(
-    "error_radius", "m", "greatest deviation along the radius of the path from the circle that the probes should read"
+    "error_radius",
+    "m",
+    "greatest deviation along the radius of the path from the circle that the probes should read",
+    title="largest deviation from the circle",
 )
 MEASURES = (PEAK_Y, PEAK_ANY, REDUCTION, PREDICTED, UNBALANCE, RATIO, GAMMA, ERROR)
 CIRCLE_M_S = 1e-4  # how fast the controller changes the circle's radius
