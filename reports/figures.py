@@ -91,7 +91,10 @@ def _svg(figure: Figure, height: float) -> str:
     drawn: list[Artist] = []
     for axes, panel in zip(every, panels, strict=True):
         artists = _panel(axes, panel)
-        drawn += [] if drawn else artists
+        if not drawn:
+            drawn += artists
+        elif {str(a.get_label()) for a in artists} - {str(a.get_label()) for a in drawn}:
+            _own_legend(axes, artists)
         if panel.below:
             axes.tick_params(labelbottom=False)
             axes.set_xlabel("")
@@ -267,6 +270,12 @@ def _legend(canvas: Canvas, drawn: list[Artist]) -> None:
     longest = max(len(str(artist.get_label())) for artist in drawn)
     columns = max(1, min(len(drawn), 56 // (longest + 7)))
     canvas.legend(handles=drawn, loc="outside lower center", ncols=columns, handlelength=1.8, columnspacing=1.2)
+
+
+def _own_legend(axes: Axes, drawn: list[Artist]) -> None:
+    """Within a panel that shows something else than the one above, where it covers least."""
+    if len(drawn) > 1:
+        axes.legend(handles=drawn, loc="best", ncols=2, handlelength=1.8, columnspacing=1.2)
 
 
 def _with_own_ids(svg: str, key: str) -> str:

@@ -48,7 +48,8 @@ def unit_text(unit: str | None) -> str:
     text = (unit or "").strip()
     if text in ("", "1"):
         return ""
-    text = re.sub(r"\^\(?(-?\d+)\)?|(?<=[A-Za-z])(-?\d+)", lambda m: (m[1] or m[2]).translate(_SUPERSCRIPTS), text)
+    powers = r"\^\((-?\d+)\)|\^(-?\d+)|(?<=[A-Za-z])(-?\d+)"
+    text = re.sub(powers, lambda m: (m[1] or m[2] or m[3]).translate(_SUPERSCRIPTS), text)
     text = re.sub(r"[A-Za-z]+", lambda m: _UNIT_WORDS.get(m[0], m[0]), text)
     return re.sub(r"\s*[*·]\s*|\s+", "·", text)
 

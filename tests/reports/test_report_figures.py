@@ -78,6 +78,20 @@ def test_an_amplitude_over_its_lag_begins_at_zero_and_angles_have_quarter_turns(
     assert set(np.abs(np.diff(lower.get_yticks()))) == {90.0}
 
 
+def test_a_lower_panel_that_shows_something_else_has_its_own_legend() -> None:
+    """Legends are groups of their own in the drawing; one is for both where the panels show the same."""
+    x = np.linspace(0.0, 10.0, 50)
+
+    def two(*labels: str) -> Figure:
+        return Figure("pair", "t", "c", "x", "y", tuple(Series(name, x, x + k) for k, name in enumerate(labels)))
+
+    legends = [
+        draw(dataclasses.replace(two("a", "b"), below=two(*below))).svg.count('id="pair-legend_')
+        for below in (("a", "b"), ("c", "d"))
+    ]
+    assert legends == [1, 2]
+
+
 def test_a_plane_with_a_closer_view_is_one_drawing_with_equal_bytes() -> None:
     turn = np.linspace(0, 2 * np.pi, 60)
     some = (
