@@ -88,7 +88,8 @@ class CircleAsked:
     """A motor that carries one end of the shaft along a circle, `radius` m at `hz` (negative: the other way round), reached in
     `ramp_s`, and balances its load from the phase `engage_rad` on. `settings` as those of steps; what is written on top when
     it begins to carry, to go around and to balance; `slew` rad/s and `balanced_limit` rad of the phase angle. `branches`: of
-    each repeat, the sign of i_x as against that of i_y."""
+    each repeat, the sign of i_x as against that of i_y. `turned`: what was written before it carried, and how long it stood, s:
+    where the rotor rests within its encoder's count is a matter of that, and by the force's ripple the load as it is seen."""
 
     settings: Numbers
     carried: Numbers
@@ -101,6 +102,7 @@ class CircleAsked:
     slew: float
     balanced_limit: float
     branches: Sequence[int]
+    turned: Sequence[tuple[Numbers, float]] = ()
 
 
 @dataclass(frozen=True)

@@ -250,6 +250,7 @@ def _circle(done: Simulated) -> Found:
     from procedures.load_balancing.estimates import FACTS_SEEN, LOADS_SEEN
     from procedures.load_balancing.procedure import ramp_s
     from procedures.load_balancing.steps import AFTER, BEFORE, of_way, read_around
+    from procedures.servomotor import wiring
     from procedures.servomotor.parameters import chosen, named
     from sim_backend.motion import CircleAsked
 
@@ -265,9 +266,10 @@ def _circle(done: Simulated) -> Found:
     for way, sign in plan.signs:
         circled = named(rig, {"motor.circle": plan.radius_m, "motor.circle_hz": sign * plan.circle_hz})
         asked = CircleAsked(
-            {name: p.default for name, p in rig.parameters.items()} | told, carried, circled,
+            _settings(done, told), carried, circled,
             chosen(rig, "load_balancing", "on"), plan.radius_m, sign * plan.circle_hz, ramp_s(plan), plan.engage_rad,
             plan.gamma_slew_rad_s, plan.gamma_max_rad, [a.branch for a in of_way(around, way, AFTER)],
+            wiring.written(rig),
         )  # fmt: skip
         for (name, when), value in of(rig, done.drawn, asked).items():
             if name == "predicted_reduction":

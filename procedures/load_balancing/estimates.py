@@ -24,6 +24,11 @@ Numbers = Mapping[str, float]
 LOADS_SEEN, FACTS_SEEN = "from the loads", "from the facts"
 LINEAR = ("peak_i_y/before", "peak_i_y/after", "reduction", f"predicted/{LOADS_SEEN}", f"predicted/{FACTS_SEEN}")
 RIPPLE = 0.025  # of the force with 16 times the angle, T (5.25)
+ROUNDING = Influence(
+    "resolution/gamma", "single precision of what is captured", 1e-8 / math.sqrt(3), "rad", "B", "rectangular"
+)
+"""All that is left of gamma at its bound. It takes a step of its slew up or down in each tick; a capture of every tenth tick
+has the same means within a hundredth of a step, for noise decides which way."""
 SENSORS = tuple(f"{what}_m{k}" for what in ("gain", "offset") for k in range(1, 5))
 
 
@@ -40,15 +45,10 @@ class Turns:
     distance_after: Array
     gamma: Array
     law: Law
-    tick_s: float
 
     def without(self, turn: int) -> Turns:
         """All but one."""
-        arrays = {
-            f.name: np.delete(getattr(self, f.name), turn, axis=0)
-            for f in fields(self)
-            if f.name not in ("law", "tick_s")
-        }
+        arrays = {f.name: np.delete(getattr(self, f.name), turn, axis=0) for f in fields(self) if f.name != "law"}
         return replace(self, **arrays)
 
     def __len__(self) -> int:
@@ -94,7 +94,7 @@ def grouped(around: Sequence[Around], plan: Plan, way: str, sign: int) -> tuple[
             paths = [np.concatenate([x.path for x in of]) for of in zip(*mine, strict=True)]
             far = [np.concatenate([x.distance for x in of]) for of in zip(*mine, strict=True)]
             gamma = np.concatenate([a.gamma for _, a in mine if a.gamma is not None])
-            out.append(Turns(before, after, paths[0], paths[1], far[0], far[1], gamma, law, mine[0][1].tick_s))
+            out.append(Turns(before, after, paths[0], paths[1], far[0], far[1], gamma, law))
     return tuple(out)
 
 
@@ -196,8 +196,8 @@ def extreme(gamma: Array, limit: float) -> float:
 def _of_group(t: Turns, plan: Plan, given: Mapping[str, Estimate]) -> dict[str, Estimate]:
     out = linearised(lambda p: of_currents(t, plan, p), given)
     ripple = Estimate.of(0.0, _ripple(plan, given["pole_pairs"].value))
-    for key, share in (("peak_i_y/after", out["peak_i_y/after"].value), ("reduction", 1 + out["reduction"].value)):
-        out[key] = out[key] + ripple * share
+    for key in (f"predicted/{LOADS_SEEN}", f"predicted/{FACTS_SEEN}"):
+        out[key] = out[key] + ripple * (1 + out[key].value)
     values = {name: e.value for name, e in given.items()}
     found = statistics(t, plan, values)
     pairs = paired(given)
@@ -208,29 +208,17 @@ def _of_group(t: Turns, plan: Plan, given: Mapping[str, Estimate]) -> dict[str, 
         scale = (1 / given["gain_xo"] + 1 / given["gain_yo"]) / 2
         out[f"error_radius/{when}"] = scale * Estimate.exact(found[f"error_radius/{when}"], "m")
     out["unbalance_ratio"] = out["unbalance/after"] / out["unbalance/before"]
-    reading = Estimate.of(found["gamma_extreme"], _between(t))
-    out["gamma_extreme"] = reading if at_bound(t) else reading + ripple * fit.follows(found["gamma_extreme"], values)
+    out["gamma_extreme"] = Estimate.of(found["gamma_extreme"], ROUNDING)
     return out
 
 
 def _ripple(plan: Plan, pole_pairs: float) -> Influence:
     """T (5.25), alpha_3 sin(P theta): by it i_x gives a force upwards where the rotor does not stand at its home angle, but
-    anywhere within a count of the encoder. As a share of i_y, which is as large; two rectangular ones in a product."""
+    anywhere within a count of the encoder, which the constants know nothing of. As a share of i_y, which is as large; two
+    rectangular ones in a product."""
     half = 2 * pole_pairs * plan.count_rad / 2 * RIPPLE
     return Influence("ripple/angle", "force ripple where the rotor stands", half / 3, "1", "B", "triangular",
                      source="T (5.25), 2.5 % of alpha_d, half a count")  # fmt: skip
-
-
-def _between(t: Turns) -> Influence:
-    """What a reading leaves open of gamma: in each tick it takes a step of its slew up or down, and a capture that reads every
-    tenth tick may see always the upper or the lower one. At its bound it stands: single precision is left."""
-    half = 1e-8 if at_bound(t) else t.law.slew * t.tick_s / 2
-    return Influence("resolution/gamma", "steps of the slew", half / math.sqrt(3), "rad", "B", "rectangular")
-
-
-def at_bound(t: Turns) -> bool:
-    """gamma stood at its bound."""
-    return float(np.abs(t.gamma.mean(axis=0)).max()) > 0.9999 * t.law.limit
 
 
 def paired(given: Mapping[str, Estimate]) -> tuple[Estimate, ...]:

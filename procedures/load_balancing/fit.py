@@ -73,12 +73,6 @@ def load(read: Complex, gamma: Array | float, p: Numbers) -> Complex:
     return out
 
 
-def follows(gamma: float, p: Numbers) -> float:
-    """By how much gamma goes, rad, for a load that turns by a radian: tan M g = r tan phi, T (6.27)."""
-    angle = p["pole_pairs"] * (gamma - p["gamma_0"])
-    return (p["ratio"] * math.cos(angle) ** 2 + math.sin(angle) ** 2 / p["ratio"]) / p["pole_pairs"]
-
-
 def balanced(d: Complex, law: Law, p: Numbers) -> Balanced:
     """T (6.36), (6.37) on a load `d` (bins,) N, without dynamics: the field is turned until the controller's i_x and i_y are
     alike, within the bound, no faster than the slew, on its branch."""

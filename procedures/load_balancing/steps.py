@@ -25,7 +25,7 @@ class Around:
     """The turns of one step. By turn and by bins of the circle's phase: `segments` (turns, bins, 4) A as their sensors read,
     `path` (turns, bins) m, horizontal + j up, at the outboard sensors, and its `distance` from their zero (a chord is nearer
     than its arc, by 1 nm in 10 ms); with balancing, from the capture, `gamma` (turns, bins) rad, `observed` (turns, bins) N,
-    the load as the controller has it, and `fastest` rad/s, of the phase angle, and the controller's tick, s. Then how
+    the load as the controller has it, and `fastest` rad/s, of the phase angle. Then how
     far the rotor `turned` within the step, rad, its flags ORed, what stood still, and lost samples."""
 
     when: str
@@ -37,7 +37,6 @@ class Around:
     gamma: Array | None
     observed: Complex | None
     fastest: float
-    tick_s: float
     turned: float
     flags: int
     stuck: tuple[str, ...]
@@ -105,19 +104,19 @@ def _read(recording: Recording[Plan], step: Step) -> Around:
     zero = float(np.angle(((x + 1j * y) * np.exp(-2j * math.pi * hz * t)).mean()))
     folded = fold(t, np.array(read), zero, hz, plan, str(dict(labels)))
     gamma = observed = None
-    fastest = tick_s = 0.0
+    fastest = 0.0
     if labels["when"] == AFTER:
-        gamma, observed, fastest, tick_s = _captured(recording, step, zero, hz)
+        gamma, observed, fastest = _captured(recording, step, zero, hz)
     flags = data[STATUS].astype(np.int64)
     return Around(
         str(labels["when"]), str(labels["way"]), int(labels["repeat"]), folded[..., :4], folded[..., 4] + 1j * folded[..., 5],
-        folded[..., 6], gamma, observed, fastest, tick_s, float(np.ptp(np.unwrap(data[ANGLE]))),
+        folded[..., 6], gamma, observed, fastest, float(np.ptp(np.unwrap(data[ANGLE]))),
         int(np.bitwise_or.reduce(flags)),
         tuple(c for c in (*positions(machine), *machine.segments) if np.ptp(data[c]) == 0), step.lost(), step.expected(),
     )  # fmt: skip
 
 
-def _captured(recording: Recording[Plan], step: Step, zero: float, hz: float) -> tuple[Array, Complex, float, float]:
+def _captured(recording: Recording[Plan], step: Step, zero: float, hz: float) -> tuple[Array, Complex, float]:
     found = recording.captures(way=step.labels["way"], repeat=step.labels["repeat"])
     if not found:
         raise AnalysisError(f"step {dict(step.labels)}: found no capture")
@@ -126,8 +125,7 @@ def _captured(recording: Recording[Plan], step: Step, zero: float, hz: float) ->
     t = (data["t_ns"] - step.start_ns) * 1e-9
     folded = fold(t, read, zero, hz, recording.plan, f"capture of {dict(step.labels)}")
     fastest = float(np.abs(np.diff(read[0])).max()) * found[0].rate_hz
-    tick_s = float(t[-1] - t[0]) / float(data["tick"][-1] - data["tick"][0])
-    return folded[..., 0], folded[..., 1] + 1j * folded[..., 2], fastest, tick_s
+    return folded[..., 0], folded[..., 1] + 1j * folded[..., 2], fastest
 
 
 def fold(t: Array, read: Array, zero: float, hz: float, plan: Plan, where: str) -> Array:

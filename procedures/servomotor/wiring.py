@@ -14,7 +14,7 @@ from bench.rigfile import RigFile
 from bench.rigfile.roles import ANGLE
 from procedures.servomotor import hold, leaning
 from procedures.servomotor.conventions import Servomotor, conventions
-from procedures.servomotor.parameters import stated, write
+from procedures.servomotor.parameters import named, stated, write
 from procedures.shared import first_look
 
 NEEDED = ("motor.across", "motor.along")
@@ -55,9 +55,25 @@ def sound(rig: Rig, record: Recorder) -> bool:
     up = _nudged(rig, record, 0.0, NUDGE_A)
     right = _nudged(rig, record, NUDGE_A, 0.0)
     write(rig, dict.fromkeys(NEEDED, 0.0))
-    rig.clock.sleep(_ramp_s(rig) + NUDGE_S)
+    rig.clock.sleep(_ramp_s(rig.file) + NUDGE_S)
     pushed = _along(up[1] - rest[1], up[0] - rest[0]) and _along(right[0] - rest[0], right[1] - rest[1])
     return pushed and (not leaning.applies(rig.file) or leaning.sound(rig, record))
+
+
+def written(rig: RigFile) -> list[tuple[dict[str, float], float]]:
+    """The parameters that `sound` writes, one after the other, and how long each stands, s: where within its encoder's count a
+    rotor comes to rest is a matter of how it was turned last."""
+    turned = ({"angle.ref": TURN_RAD, "angle.kp": hold.PROBE_GAIN}, TURN_S)
+    held = ({"angle.ref": 0.0} | {key: stated(rig, key).default for key in hold.GAINS}, 1.0)
+    stands = _ramp_s(rig) + NUDGE_S
+    along = [
+        (0.0, 0.0, stands + NUDGE_S),
+        (0.0, NUDGE_A, stands + NUDGE_S),
+        (NUDGE_A, 0.0, stands + NUDGE_S),
+        (0.0, 0.0, stands),
+    ]
+    pushed = [({"motor.across": x, "motor.along": y}, seconds) for x, y, seconds in along]
+    return [(named(rig, values), seconds) for values, seconds in (turned, held, *pushed)]
 
 
 def _turned(rig: Rig, record: Recorder) -> float:
@@ -80,13 +96,13 @@ def _nudged(rig: Rig, record: Recorder, i_x: float, i_y: float) -> tuple[float, 
     """The outboard AMB's control currents across and along the motor's first segment, A, with open-loop currents in it: means,
     for noise makes single readings of a sound motor look like a push the other way."""
     write(rig, {"motor.across": i_x, "motor.along": i_y})
-    rig.clock.sleep(_ramp_s(rig) + NUDGE_S)
+    rig.clock.sleep(_ramp_s(rig.file) + NUDGE_S)
     machine = conventions(rig.file)
     with record.step("nudge", i_x_A=i_x, i_y_A=i_y):
         seen = first_look.watched(rig, record, machine.coils_of("xo", "yo"), NUDGE_S)
     return machine.pushed(machine.control("xo", seen.__getitem__), machine.control("yo", seen.__getitem__))
 
 
-def _ramp_s(rig: Rig) -> float:
-    motor = rig.file.capabilities.motor
-    return 2 * NUDGE_A / (stated(rig.file, "motor.ramp").default if motor.ramp else 2.0)
+def _ramp_s(rig: RigFile) -> float:
+    motor = rig.capabilities.motor
+    return 2 * NUDGE_A / (stated(rig, "motor.ramp").default if motor.ramp else 2.0)

@@ -136,15 +136,6 @@ def test_where_gamma_is_back_in_time_the_run_says_how_far_the_rotor_turned(tmp_p
     assert turned > 30
 
 
-def test_gamma_follows_a_load_that_turns() -> None:
-    """By the law itself, on both sides of where alpha_d and alpha_c are alike."""
-    p = P | {"gamma_0": 0.002}
-    for across in (-20.0, 5.0, 22.0):
-        load = np.asarray([across - 48.55j], np.complex128)
-        gamma = [float(fit.balanced(load * np.exp(1j * x), NO_BOUND, p).gamma[0]) for x in (-1e-5, 0.0, 1e-5)]
-        assert abs(gamma[2] - gamma[0]) / 2e-5 == pytest.approx(fit.follows(gamma[1], p), rel=1e-6)
-
-
 def check(**changes: object) -> list[str]:
     return list(load_procedure("load-balancing").check(load_rig("tsbs12"), Plan.model_validate(changes)))
 

@@ -52,8 +52,9 @@ def _moved(rig: RigFile, drawn: Truth, p: PlantParams, asked: CircleAsked, branc
                 plant.set(control.name, control.of(value) * drawn.defects.get(f"factor_{name}", 1.0))
 
     turn = round(1 / (abs(asked.hz) * TICK_S))
-    write(asked.carried)
-    plant.run(20000)
+    for values, seconds in (*asked.turned, (asked.carried, 2.0)):
+        write(values)
+        plant.run(round(seconds / TICK_S))
     write(asked.circled)
     plant.run(round(asked.ramp_s / TICK_S))
     before = _turns(plant, turn)
