@@ -30,6 +30,7 @@ AT = {name: k for k, name in enumerate(CHANNELS)}
 GAMMA = TRACE.index("gamma")
 MEAN = 10  # ms of which means are taken around the circle
 TURNS = 48
+CUT = 0.995  # of the limit of gamma
 NEAR, ORDERS = 8, 2  # means to either side of a peak, through which a parabola is laid; harmonics of the path
 NEVER = -1  # a visit that no run is of: its noise is the truth's own
 FIXED = 4  # rounds for the direction of balanced currents, which sensors' zeros turn by a thousandth
@@ -76,7 +77,7 @@ def _moved(rig: RigFile, drawn: Truth, p: PlantParams, asked: CircleAsked, branc
     control = ControlParams(**{f.name: plant.get(f.name) for f in fields(ControlParams)})
     paths = (_path(before[0]), _path(after[0]))
     return out | {
-        ("gamma_extreme", ""): min(_top(np.abs(_mean(after[1]))), asked.balanced_limit),
+        ("gamma_extreme", ""): _extreme(np.abs(_mean(after[1])), asked.balanced_limit),
         ("reduction", ""): out["peak_i_y", "after"] / out["peak_i_y", "before"] - 1,
         ("unbalance_ratio", ""): out["unbalance", "after"] / out["unbalance", "before"],
         ("predicted_reduction", ""): quasi_static(p, control, asked, branch, paths),
@@ -127,6 +128,11 @@ def _top(x: Array) -> float:
     c2, c1, c0 = np.polyfit(s, np.take(x, k + s, mode="wrap"), 2)
     smooth = c2 < 0 and abs(c1) <= -2 * c2 * NEAR
     return float(c0 - c1**2 / (4 * c2)) if smooth else float(x[k])
+
+
+def _extreme(gamma: Array, limit: float) -> float:
+    """A top that is cut off at the limit, or nearly, is no parabola."""
+    return float(gamma.max()) if gamma.max() > CUT * limit else _top(gamma)
 
 
 def _off_circle(rows: Array, radius: float) -> float:
