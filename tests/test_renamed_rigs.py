@@ -200,12 +200,14 @@ def here(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[str, Results]]:
 @pytest.mark.timeout(900)
 @pytest.mark.xdist_group("servomotor elsewhere")
 def test_the_servomotor_elsewhere_has_the_same_numbers(tmp_path: Path, here: list[tuple[str, Results]]) -> None:
-    """Telemetry in one message and a reply to everything: the same samples at the same times, the same numbers to the last
-    digit; shares of a budget are summed up in the order of their names, so that u is to 1e-12."""
+    """Telemetry in one message and a reply to everything: the same samples at the same times, the same numbers. Shares of a
+    budget are summed up in the order of their names, so that u is the same to 1e-12; and so are means weighted by them, whose
+    last digit may differ (alpha_d@0 of force-constant on some processors, and what rests on it)."""
     for (procedure, ours), (_, there) in zip(here, chained(elsewhere(tmp_path, replies=True), tmp_path), strict=True):
         (values, found), (others, also) = ours, told(there)
         assert values, procedure
-        assert {name: v for name, (v, _) in values.items()} == {name: v for name, (v, _) in others.items()}, procedure
+        assert values.keys() == others.keys(), procedure
+        assert [v for v, _ in others.values()] == pytest.approx([v for v, _ in values.values()], rel=1e-13), procedure
         assert [u for _, u in others.values()] == pytest.approx([u for _, u in values.values()], rel=1e-12), procedure
         assert found == also, procedure
 
