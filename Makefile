@@ -25,7 +25,7 @@ check: setup
 	$(MAKE) test
 
 ci-long: setup
-	$(BIN)/python -m pytest -q -m "long and not links" -n 3 --dist loadgroup tests
+	$(BIN)/python -m pytest -q -m "long and not links" -n 2 --dist loadgroup tests
 
 faults: setup
 	$(BIN)/python -m pytest -q -m faults tests/firmware/test_misbehaviours.py

@@ -6,19 +6,16 @@ not let it change: the marks are ignored without a word (pytest-xdist issue 1386
 
 from __future__ import annotations
 
-import os
 from typing import Any
 
-REAL_TIME = ("real-time", "real-time, links")
 GROUPS = {
-    # Their processes keep up with wall time: two groups, since most of that is waiting.
+    # Their processes keep up with wall time.
     "real-time": ("tests/links/test_captures.py", "tests/links/test_chain.py", "tests/links/test_killed.py",
                   "tests/links/test_live_run.py",
                   "tests/links/test_two_benches.py", "tests/links/test_unplug.py", "tests/firmware/",
                   "tests/cli/test_serve.py", "tests/drivers/test_heartbeat", "tests/drivers/test_live_link.py",
                   "tests/drivers/test_fieldbus_live.py", "test_docs.py::test_commands_work[serve-a-rig]",
                   "test_docs.py::test_commands_work[connect-a-rig]", "test_docs.py::test_commands_work[add-a-device]"),
-    "real-time, links": ("tests/links/", "tests/device/test_landing.py"),
     # They begin with the same calibrations, which are made once.
     "identified": ("tests/procedures/test_amb_calibration.py", "tests/procedures/test_amb_facts.py",
                    "tests/procedures/test_force_constant.py", "tests/procedures/test_force_coupling.py",
@@ -33,11 +30,6 @@ GROUPS = {
 ALONE = ("tests/test_docs.py::test_commands_work",)
 """Long tests of one file that share nothing: each goes to whichever worker is free."""
 
-FIRST = (*REAL_TIME, "tests/test_described.py", "tests/test_machines.py", "tests/procedures/test_coverage_long.py",
-         "tests/procedures/test_moved_long.py")  # fmt: skip
-"""What takes minutes is handed out first, or one worker ends long after the others."""
-NICE = 10  # of the workers that need not keep up: those that must, and wait most of the time, find a free processor
-
 
 def group_of(nodeid: str) -> str:
     """The group's name; where there is none the file, whose fixtures are then made by one worker only."""
@@ -46,24 +38,11 @@ def group_of(nodeid: str) -> str:
 
 
 def scheduler(config: Any, log: Any) -> Any:
-    """Hands out groups whole: FIRST, then those with the most tests."""
+    """Hands out groups whole, those with the most tests first."""
     from xdist.scheduler import LoadScopeScheduling
 
     class ByGroup(LoadScopeScheduling):
         def _split_scope(self, nodeid: str) -> str:
             return group_of(nodeid)
 
-        def _assign_work_unit(self, node: Any) -> None:
-            waiting = [name for name in FIRST if name in self.workqueue]
-            if waiting:
-                self.workqueue.move_to_end(waiting[0], last=False)
-            super()._assign_work_unit(node)
-
     return ByGroup(config, log)
-
-
-def give_way(nodeid: str) -> None:
-    """Before a test on a worker that other workers share the machine with: whatever need not keep up with wall time lets those
-    go first that must. There is no way back, but their groups were handed out before all others."""
-    if "PYTEST_XDIST_WORKER" in os.environ and hasattr(os, "nice") and group_of(nodeid) not in REAL_TIME:
-        os.nice(max(NICE - os.nice(0), 0))

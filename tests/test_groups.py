@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -27,7 +26,6 @@ def test_every_part_names_something() -> None:
     [
         ("tests/links/test_killed.py::test_a_killed_rig_is_noticed", "real-time"),
         ("tests/drivers/test_heartbeat_alone.py::test_x[1]", "real-time"),
-        ("tests/links/test_listen.py::test_x", "real-time, links"),
         ("tests/test_docs.py::test_commands_work[connect-a-rig]", "real-time"),
         ("tests/test_docs.py::test_commands_work[force-coupling]", "chained pages"),
         ("tests/test_docs.py::test_commands_work[slew]", "tests/test_docs.py::test_commands_work[slew]"),
@@ -40,16 +38,14 @@ def test_the_group_of_a_test(nodeid: str, group: str) -> None:
 
 
 def test_a_group_runs_on_one_worker(tmp_path: Path) -> None:
-    """In a session of its own: the tests of `firmware` on one worker, in their order, whatever the others do. They are handed
-    out first, though others are more, and the other worker's tests give way to them."""
+    """In a session of its own: the tests of `firmware` on one worker, in their order, whatever the others do."""
     (tmp_path / "pyproject.toml").write_text("[tool.pytest.ini_options]\n")
     (tmp_path / "conftest.py").write_text((ROOT / "tests" / "conftest.py").read_text())
     (tmp_path / "groups.py").write_text((ROOT / "tests" / "groups.py").read_text())
     (tmp_path / "tests" / "firmware").mkdir(parents=True)
-    of = "import os, pytest\n@pytest.mark.parametrize('k', range({}))\ndef test_x(k): assert os.nice(0) == {}\n"
-    now = os.nice(0)
-    (tmp_path / "tests" / "firmware" / "test_a.py").write_text(of.format(8, now))
-    (tmp_path / "tests" / "test_b.py").write_text(of.format(9, max(now, groups.NICE)))
+    many = "import pytest\n@pytest.mark.parametrize('k', range(8))\ndef test_{}(k): pass\n"
+    (tmp_path / "tests" / "firmware" / "test_a.py").write_text(many.format("a"))
+    (tmp_path / "tests" / "test_b.py").write_text(many.format("b"))
     done = subprocess.run(
         [sys.executable, "-m", "pytest", "-v", "-n", "2", "--dist", "loadgroup", "-p", "no:cacheprovider",
          "-p", "no:hypothesispytest"], cwd=tmp_path, capture_output=True, text=True, check=False,
@@ -57,6 +53,6 @@ def test_a_group_runs_on_one_worker(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stdout
     lines = [line.split() for line in done.stdout.splitlines() if "PASSED" in line]
     of_one = [words for words in lines if "firmware" in words[-1]]
-    assert len(lines) == 17
+    assert len(lines) == 16
     assert len({words[0] for words in of_one}) == 1
     assert [words[-1][-2] for words in of_one] == list("01234567")
