@@ -8,7 +8,7 @@ clock is wrong where nearly all least latenesses, one in half a second of host t
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -126,9 +126,9 @@ def _line(points: Floats, tight_ns: float, loose: float = 0.0) -> Line:
     return Line(slope, expanded, len(x), float(near.mean()), float((rest < -tolerance).mean()))
 
 
-@cache
+@lru_cache(maxsize=8)
 def _pairs(n: int) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
-    """First and second of all pairs of n points; kept, as a judgement each 0.1 s asks for the same few n."""
+    """First and second of all pairs of n points; kept, as every slice asks for the same few n."""
     first, second = np.triu_indices(n, 1)
     return first, second
 

@@ -25,8 +25,8 @@ class Around:
     """The turns of one step. By turn and by bins of the circle's phase: `segments` (turns, bins, 4) A as their sensors read,
     `path` (turns, bins) m, horizontal + j up, at the outboard sensors, and its `distance` from their zero (a chord is nearer
     than its arc, by 1 nm in 10 ms); with balancing, from the capture, `gamma` (turns, bins) rad, `observed` (turns, bins) N,
-    the load as the controller has it, and `fastest` rad/s, of the phase angle. Then how
-    far the rotor `turned` within the step, rad, its flags ORed, what stood still, and lost samples."""
+    the load as the controller has it, and `fastest` rad/s, of the phase angle. Then how far the rotor `turned` within the step,
+    rad, its flags ORed, what stood still, and lost samples."""
 
     when: str
     way: str

@@ -1,8 +1,9 @@
 """Load balancing on a circle (T 6.7.3): what the drawn machine does in the mean, and what its own constants say it should.
 
 The machine runs with noise of its position sensors, another than that of the run: gamma follows a noisy load by a slew, and so
-lags behind more than without. Means over TURNS leave little of it. The shaft stands at its home angle. The load on the motor is
-D, N, horizontal + j up; currents are those along the field.
+lags behind more than without. Means over TURNS leave little of it. The shaft stands at its home angle, within the count of its
+encoder where turning it as the run does has left it. The load on the motor is D, N, horizontal + j up; currents are those along
+the field.
 """
 
 from __future__ import annotations
@@ -58,12 +59,12 @@ def _moved(rig: RigFile, drawn: Truth, p: PlantParams, asked: CircleAsked, branc
         plant.run(round(seconds / TICK_S))
     write(asked.circled)
     plant.run(round(asked.ramp_s / TICK_S))
-    before = _turns(plant, turn)
+    before = plant.run(TURNS * turn, PERIOD_TICKS)
     plant.run(round((asked.engage_rad * math.copysign(1, asked.hz) / math.tau) % 1 * turn))
     plant._s.law.balancing, plant._s.law.line = 1.0, branch * 1.2  # the side that the machine took
     write(asked.balanced)
     plant.run(turn)
-    after = _turns(plant, turn)
+    after = plant.run(TURNS * turn, PERIOD_TICKS)
     scale = (1 / p.position_gain[2] + 1 / p.position_gain[3]) / 2
     out: dict[tuple[str, str], float] = {}
     for when, (rows, _) in (("before", before), ("after", after)):
@@ -77,22 +78,11 @@ def _moved(rig: RigFile, drawn: Truth, p: PlantParams, asked: CircleAsked, branc
     control = ControlParams(**{f.name: plant.get(f.name) for f in fields(ControlParams)})
     paths = (_path(before[0]), _path(after[0]))
     return out | {
-        ("gamma_extreme", ""): _extreme(np.abs(_mean(after[1])), asked.balanced_limit),
+        ("gamma_extreme", ""): _extreme(np.abs(_mean(after[1][:, GAMMA])), asked.balanced_limit),
         ("reduction", ""): out["peak_i_y", "after"] / out["peak_i_y", "before"] - 1,
         ("unbalance_ratio", ""): out["unbalance", "after"] / out["unbalance", "before"],
         ("predicted_reduction", ""): quasi_static(p, control, asked, branch, paths),
     }
-
-
-def _turns(plant: Plant, turn: int) -> tuple[Array, Array]:
-    """TURNS of `turn` ticks: rows of each ms, and the mean of gamma over its ticks. In each tick gamma takes a step of its slew
-    up or down, so that one tick of ten may always be an upper one."""
-    rows, gamma = [], []
-    for _ in range(TURNS):
-        means, ticks = plant.run(turn, 1)
-        rows.append(means)
-        gamma.append(ticks[:, GAMMA].reshape(-1, PERIOD_TICKS).mean(axis=1))
-    return np.concatenate(rows), np.concatenate(gamma)
 
 
 def _levitated(rig: RigFile, drawn: Truth, p: PlantParams, settings: Numbers) -> Plant:

@@ -133,15 +133,12 @@ class Plant(CorePlant):
         start = self.tick
         limit = (ticks + PERIOD_TICKS - 1) // PERIOD_TICKS + 1
         rows = np.empty((limit, len(CHANNELS)))
+        kept = np.empty((ticks // trace + 1 if trace else 0, len(TRACE)))
         at = _ffi.from_buffer("double[]", rows.data)
-        if not trace:
-            _lib.tsbs_run(self._p, self._c, self._s, ticks, at, limit, _ffi.NULL, 0)
-            return rows[: self.tick // PERIOD_TICKS - start // PERIOD_TICKS]
-        kept = np.empty((ticks // trace + 1, len(TRACE)))
-        _lib.tsbs_run(self._p, self._c, self._s, ticks, at, limit, _ffi.from_buffer("double[]", kept.data), trace)
-        return rows[: self.tick // PERIOD_TICKS - start // PERIOD_TICKS], kept[
-            : -(-self.tick // trace) - -(-start // trace)
-        ]
+        into = _ffi.from_buffer("double[]", kept.data) if trace else _ffi.NULL
+        _lib.tsbs_run(self._p, self._c, self._s, ticks, at, limit, into, trace)
+        rows = rows[: self.tick // PERIOD_TICKS - start // PERIOD_TICKS]
+        return (rows, kept[: -(-self.tick // trace) - -(-start // trace)]) if trace else rows
 
     def state(self) -> dict[str, Any]:
         """True state, for tests: `s` (14,) positions and rates, `coil` (10,), `segment` (4,) complex in the stator's frame,
