@@ -133,12 +133,14 @@ def run_case(case: Case, seed: int, path: Path, known: Mapping[str, Calibration]
 
 def judged(done: Simulated, rig: str) -> dict[str, Any]:
     """Outcome by the rig's limits, findings that are no notes, verdicts that are not pass, values that are off."""
-    limits, _ = applied(load_spec(load_rig(rig).name, done.procedure.name), done.recording.plan)
+    left_out = [q.name for q in done.procedure.left_out(done.recording.plan)]
+    limits, _ = applied(load_spec(load_rig(rig).name, done.procedure.name), done.recording.plan, left_out)
     findings = [r for r in done.results if isinstance(r, Finding)]
     measured = [r for r in done.results if isinstance(r, Measured)]
     entries = [measurement(m, limits.get(m.quantity.name), done.seed) for m in measured]
     names = {m.quantity.name for m in measured}
-    lacking = [q for q in done.procedure.measures if q.name not in names and q not in done.procedure.optional]
+    may_lack = {q.name for q in done.procedure.optional} | set(left_out)
+    lacking = [q for q in done.procedure.measures if q.name not in names | may_lack]
     entries += [missing(q, limits.get(q.name)) for q in lacking]
     truth = {**done.truth, **truth_of_motion(done)}
     deciding = [f for f in findings if f.effect is not Effect.NOTE]

@@ -168,6 +168,14 @@ def test_a_limit_holds_at_the_settings_that_it_was_stated_for(at: str, holds: bo
     assert (set(found), [f.code for f in notes]) == (({"q"}, []) if holds else (set(), ["limit-not-applied"]))
 
 
+def test_a_limit_for_what_a_plan_does_not_measure_judges_nothing_and_says_so() -> None:
+    limits = parse_spec(f"schema = 1\n[limits.p]\nq = {{ low = 3, {ENTRY} }}\n'q@front' = {{ low = 4, {ENTRY} }}")["p"]
+    assert set(applied(limits, Settings())[0]) == {"q", "q@front"}
+    found, (note,) = applied(limits, Settings(), ["q"])
+    assert (set(found), note.code) == (set(), "limit-not-applied")
+    assert note.text == "no verdict on q, q@front: this plan does not measure it"
+
+
 @pytest.mark.parametrize("bias", [2.0, 4.0])
 def test_the_slopes_of_3_A_do_not_judge_another_bias(bias: float) -> None:
     """A sound machine has 49 or 98 N/A there."""

@@ -55,7 +55,7 @@ def _no_settings(_rig: RigFile, _plan: Any) -> Mapping[str, float]:
     return {}
 
 
-def _all_told(_: RigFile) -> tuple[Quantity, ...]:
+def _all_told(_: Any) -> tuple[Quantity, ...]:
     return ()
 
 
@@ -93,6 +93,7 @@ class Procedure:
     a rig that has it, before anything starts, and names what cannot work. `settings` are the parameters of the rig's
     controller, SI, that the runner writes in READY, before it levitates. `optional` of the measures are those that a sound
     machine may lack: not missing where no limit asks; `untold` are those that a rig cannot show, whatever its state.
+    `left_out` are those that a plan does not measure: none of them is missing, and a limit for one judges nothing.
     `step_count` is how many steps `acquire` will record, for the progress display; 0 is unknown. `fewest_steps` is how many
     a run that goes to its end has at least, where these are fewer; `former_steps` how many one of plan schema 1 has, where
     it had fewer; `steps_on` is `step_count` where that depends on the rig.
@@ -138,6 +139,7 @@ class Procedure:
     holds_for: Callable[[Any], Mapping[str, float]] = field(default=_numbers_of)
     optional: tuple[Quantity, ...] = ()
     untold: Callable[[RigFile], tuple[Quantity, ...]] = field(default=_all_told)
+    left_out: Callable[[Any], tuple[Quantity, ...]] = field(default=_all_told)
     reached: tuple[str, ...] = ()
     assumes: tuple[str, ...] = ()
     places: tuple[str, ...] = ()
@@ -153,12 +155,13 @@ class Procedure:
         """How many steps `acquire` will record on a rig; 0 is unknown."""
         return self.step_count(plan) if self.steps_on is None else self.steps_on(rig, plan)
 
-    def on(self, rig: RigFile) -> Procedure:
-        """With its quantities by the names that a rig has for them at its places."""
+    def on(self, rig: RigFile, plan: Any = None) -> Procedure:
+        """With its quantities by the names that a rig has for them at its places; `optional` are those that a plan leaves out
+        too, where there is one."""
         untold: tuple[Quantity, ...] = ()
         with suppress(Lacking):  # a rig that it cannot run on: `lacking` says so
             untold = self.untold(rig)
-        may_lack = tuple(dict.fromkeys((*self.optional, *untold)))
+        may_lack = tuple(dict.fromkeys((*self.optional, *untold, *(() if plan is None else self.left_out(plan)))))
         measures, optional = (quantities_on(rig.aliases, some) for some in (self.measures, may_lack))
         if (measures, optional) == (self.measures, self.optional):
             return self

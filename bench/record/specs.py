@@ -147,15 +147,19 @@ def _read(
     return path, parse_spec(text, str(path))
 
 
-def applied(limits: Mapping[str, Limit], plan: BenchPlan) -> tuple[Mapping[str, Limit], tuple[Finding, ...]]:
-    """The limits that hold for a plan, and a note for those that were stated for other settings, with these."""
+def applied(
+    limits: Mapping[str, Limit], plan: BenchPlan, left_out: Collection[str] = ()
+) -> tuple[Mapping[str, Limit], tuple[Finding, ...]]:
+    """The limits that hold for a plan, and a note for those that were stated for other settings, with these, or for a quantity
+    of `left_out`, which the plan does not measure."""
     others: dict[str, list[str]] = {}
     for name, limit in limits.items():
-        if differ := "; ".join(_differences(limit, plan)):
-            others.setdefault(differ, []).append(name)
+        if name.partition("@")[0] in left_out:
+            others.setdefault("this plan does not measure it", []).append(name)
+        elif differ := "; ".join(_differences(limit, plan)):
+            others.setdefault(f"the limit was stated for {differ}", []).append(name)
     notes = tuple(
-        Finding(NOT_APPLIED, f"no verdict on {', '.join(names)}: the limit was stated for {differ}", "spec")
-        for differ, names in others.items()
+        Finding(NOT_APPLIED, f"no verdict on {', '.join(names)}: {why}", "spec") for why, names in others.items()
     )
     left_out = {name for names in others.values() for name in names}
     return {name: limit for name, limit in limits.items() if name not in left_out}, notes

@@ -15,6 +15,7 @@ from bench.errors import AnalysisError, BenchError, RecordingError, SignalAbort
 from bench.findings import Effect, Finding
 from bench.link.counts import LinkCounts
 from bench.procedure import Measured, Procedure
+from bench.procedure.names import quantities_on
 from bench.record.limited import limit_of, never_measured
 from bench.record.limits import Limit
 from bench.record.outcomes import SOUND, Outcome, outcome_of, unjudged
@@ -111,10 +112,12 @@ def evaluate(
         SignalAbort: the user stops it.
     """
     if recording is not None:  # there may be none of a run that was stopped
-        procedure, limits = procedure.on(recording.rig), by_names(recording.rig.aliases, limits)
+        procedure = procedure.on(recording.rig, recording.plan)
+        limits = by_names(recording.rig.aliases, limits)
     if stopped or recording is None:
         return Evaluation(_in_order(procedure, {}, limits), Correlations((), ()), ())
-    stated, (limits, notes) = limits, applied(limits, recording.plan)
+    left_out = [q.name for q in quantities_on(recording.rig.aliases, procedure.left_out(recording.plan))]
+    stated, (limits, notes) = limits, applied(limits, recording.plan, left_out)
     limits, mistaken = in_unit(limits, (*procedure.measures, *procedure.kinds))
     measured: dict[tuple[str, str], Measured] = {}
     findings = [*notes, *mistaken]

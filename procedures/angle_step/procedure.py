@@ -215,6 +215,7 @@ procedure = Procedure(
     check=check,
     settings=settings,
     untold=lambda rig: () if bounds.captured(rig) else CAPTURED,
+    left_out=lambda plan: () if "priority" in plan.allocations else (BOUND,),
     step_count=step_count,
     steps_on=lambda rig, plan: step_count(plan) - wiring.STEPS + wiring.steps(rig),
     reached=(

@@ -16,7 +16,10 @@ from bench.cli.motion_truth import truth_of_motion
 from bench.cli.virtual import Simulated, simulated_run
 from bench.findings import Effect, Finding
 from bench.procedure import Measured
+from bench.record.outcomes import Outcome, outcome_of
+from bench.record.specs import load_spec
 from bench.rigfile import load_rig
+from bench.run.evaluation import evaluate
 from bench.uncertainty import Estimate
 from procedures.angle_step import bounds, checks, estimates, fine
 from procedures.angle_step.bounds import Swing
@@ -254,3 +257,13 @@ def test_what_the_frame_does_not_allow_is_said() -> None:
         assert "motors.motor.direction" in load_procedure(name).lacking(rig)[0]
     for name in ("amb-calibration", "torque-constant", "spindown", "angle-step", "slew"):
         assert load_procedure(name).lacking(rig) == ()
+
+
+def test_static_alone_has_no_bound_to_break_and_nothing_is_missing(tmp_path: Path) -> None:
+    plan = {**QUICK, "allocations": ("static",), "steps_rad": (FIVE,), "steps_static_rad": ()}
+    run = simulated_run("angle-step", RIG, 3, plan, tmp_path / "static.mcap")
+    judged = evaluate(procedure, run.recording, load_spec(RIG, "angle-step"), stopped=False)
+    assert outcome_of(judged.measurements, judged.findings, None) is Outcome.PASS
+    assert [f.text for f in judged.findings if f.code == "limit-not-applied"] == [
+        "no verdict on bound_excess: this plan does not measure it"
+    ]
