@@ -120,7 +120,8 @@ class AngleAsked:
     """Steps of the angle while the motor carries: `settings` as those of steps, by which the shaft is lifted with its angle
     released; by what it is `turned` a little and then `holds` its angle, the `gains` of the steps, what the motor `carries` by,
     the parameter of the `reference`, the limit of a segment, A, cases by how they are named, how often each way, and the times
-    before, between and after, s."""
+    before, between and after, s. `idle`: how long nothing was recorded before each step, s, in their order: the angle's
+    integrator goes on learning."""
 
     settings: Numbers
     turned: Numbers
@@ -134,6 +135,7 @@ class AngleAsked:
     settle_s: float
     standstill_s: float
     record_s: float
+    idle: Sequence[float] = ()
 
 
 @dataclass(frozen=True)

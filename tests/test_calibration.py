@@ -316,3 +316,15 @@ def test_an_optional_need_is_not_missed_but_must_fit(rig: RigFile, tmp_path: Pat
     late = dataclasses.replace(lookup, now=datetime(2027, 6, 1, tzinfo=UTC))
     with pytest.raises(ConfigError, match="expired on 2026-12-31"):
         late.found("unbalance", [need])
+
+
+def test_a_calibration_that_lacks_a_value_is_refused_before_the_run(rig: RigFile, tmp_path: Path) -> None:
+    store, now = Store.of(rig, 3, tmp_path), datetime(2026, 6, 1, tzinfo=UTC)
+    lookup = Lookup(store, rig, now, lambda need: f"bench run {need.procedure}")
+    store.adopt(made(due="2026-12-31"))
+    held = sorted(made().values)
+    assert len(lookup.found("lift-off", [Need("amb-calibration", facts=tuple(held))])) == 1
+    with pytest.raises(
+        ConfigError, match=f"does not hold alpha_z; it has {', '.join(held)}\n    next: bench run amb-cal"
+    ):
+        lookup.found("lift-off", [Need("amb-calibration", facts=(*held, "alpha_z"))])

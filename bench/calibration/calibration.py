@@ -30,12 +30,13 @@ RIG_TABLES = ("site", "geometry", "masses", "sensors", "machine", "hook")
 
 @dataclass(frozen=True)
 class Need:
-    """A calibration that a run uses: of which procedure, and the settings that it must have been made at. Without an
-    `optional` one the run does; one that is there and does not fit is refused all the same."""
+    """A calibration that a run uses: of which procedure, the settings that it must have been made at, and the values that it
+    must have, by name. Without an `optional` one the run does; one that is there and does not fit is refused all the same."""
 
     procedure: str
     settings: Mapping[str, float] = field(default_factory=dict)
     optional: bool = False
+    facts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

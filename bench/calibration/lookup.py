@@ -68,6 +68,8 @@ class Lookup:
             yield f"is {foreign}"
         elif differ := settings_differ(c.settings, need.settings):
             yield "made at other settings: " + "; ".join(differ)
+        elif lacks := [name for name in need.facts if name not in c.values]:
+            yield f"does not hold {', '.join(lacks)}; it has {', '.join(sorted(c.values)) or 'no values'}"
         elif changed := changed_certificates(c.certificates, self.rig):
             yield "made with other certificates than the rig file has now:\n      " + "\n      ".join(changed)
         elif c.ahead(self.now):

@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from bench.errors import BenchError
@@ -302,11 +303,20 @@ def _angle(done: Simulated) -> Found:
         named(rig, {"angle.ref": 0.0} | {key: stated(rig, key).default for key in hold.GAINS}), named(rig, carried(rig, plan)),
         named(rig, {"motor.share": 1.0}), parameter(rig, "angle.ref"),
         stated(rig, "motor.segment_limit").default, cases, plan.repeats, plan.settle_s, plan.standstill_s, plan.record_s,
+        _idle(done),
     )  # fmt: skip
     outboard, motor = conventions(rig).bearings[1], next(iter(rig.motors), "motor")
     places = {"peak_outboard": outboard, "peak_motor": motor}
     for (name, where), value in of(rig, done.drawn, asked).items():
         yield ("peak", f"{places[name]}, {where}", value) if name in places else (name, where, value)
+
+
+def _idle(done: Simulated) -> list[float]:
+    """How long nothing was recorded before each step of the angle, s: its writes, its standstill, the upload of a capture."""
+    from procedures.angle_step.steps import STEP
+
+    steps = done.recording.steps(STEP)
+    return [0.0, *(1e-9 * (b.start_ns - a.end_ns) for a, b in pairwise(steps))]
 
 
 def _maximum_speed(done: Simulated) -> Found:

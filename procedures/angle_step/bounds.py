@@ -31,14 +31,15 @@ Array = npt.NDArray[np.float64]
 ASKED = ("across", "along", "torque")
 POSITIONS = ("xi", "yi", "xo", "yo")
 CAPTURED_S = 0.4
-ROUNDING_A = 10 * 2**-23  # of what the law tells, single precision
+ROUNDING_A = 10 * 2**-23  # of what the law tells, single precision: no cut is seen in less
 
 
 @dataclass(frozen=True)
 class Swing:
-    """A captured step: `t` (n,) s, `asked` i_x, i_y, i_theta of the law, each (n,) A, `vectors` (k, 2, n) A: q and d of each
-    segment as their sensors read; `limit` I_s, A; `angle` (n,) rad as the encoder tells it; `orbit` and `motor` (2, n) m off
-    the sensors' zero, at the outboard sensor and at the motor; `spread`: the latter's noise over that of one sensor."""
+    """A captured step: `t` (n,) s, `asked` i_x, i_y, i_theta of the law, each (n,) A, or nothing where it does not tell them;
+    `vectors` (k, c, n) A: q and d of each segment as their sensors read, or its amplitude; `limit` I_s, A; `angle` (n,) rad as
+    the encoder tells it; `orbit` and `motor` (2, n) m off the sensors' zero, at the outboard sensor and at the motor; `spread`:
+    the latter's noise over that of one sensor."""
 
     t: Array
     asked: Mapping[str, Array]
@@ -55,9 +56,17 @@ class Swing:
         return bound(self.asked["across"], self.asked["along"], self.limit)
 
     @property
-    def cut(self) -> float:
+    def torque(self) -> Array:
+        """The torque current (n,) A, as its sensors read: the mean along the field."""
+        out: Array = self.vectors[:, 0].mean(axis=0)
+        return out
+
+    @property
+    def cut(self) -> float | None:
         """How long the law asks a segment for more than its limit, s, which its amplifier cuts: q is i_theta +- i_y, d is i_x,
-        T (7.12)."""
+        T (7.12); None where it does not tell."""
+        if not self.asked:
+            return None
         most = np.hypot(np.abs(self.asked["torque"]) + np.abs(self.asked["along"]), self.asked["across"])
         return float((most > self.limit + 3 * ROUNDING_A).sum() * self.t[1])
 
@@ -65,6 +74,15 @@ class Swing:
     def excess(self) -> float:
         """Greatest torque current beyond its bound, A: 0 where it was reached, negative where it never was."""
         return float((np.abs(self.asked["torque"]) - self.bound).max())
+
+    @property
+    def rounding(self) -> float:
+        """What rounding of i_x, i_y, i_theta to single precision may add to the excess where it is greatest, A."""
+        k = int(np.argmax(np.abs(self.asked["torque"]) - self.bound))
+        x, y, torque = (float(self.asked[key][k]) for key in ASKED)
+        steep = min(abs(x) / max(math.sqrt(max(self.limit**2 - x**2, 0.0)), 1e-12), 1e3)  # of the bound, by i_x
+        halves = [0.5 * float(np.spacing(np.float32(abs(value)))) for value in (x, y, torque)]
+        return steep * halves[0] + halves[1] + halves[2]
 
 
 def bound(i_x: Array, i_y: Array, limit: float) -> Array:
@@ -76,23 +94,31 @@ def bound(i_x: Array, i_y: Array, limit: float) -> Array:
 
 
 def captured(rig: RigFile) -> tuple[str, ...]:
-    """What is captured of a step: nothing where currents are amplitudes, or what the law asks for is not recorded."""
+    """What is captured of a step: segments, positions and angle, with what the law asks for where that is bounded by vectors;
+    nothing where the controller does not record them."""
     machine = conventions(rig)
-    asked = (machine.asked[key] for key in ASKED if key in machine.asked)
+    asked = tuple(machine.asked[key] for key in ASKED) if bounded(rig) else ()
     names = (*machine.segments, *asked, *machine.positions_of(*POSITIONS), *resolved(rig, [ANGLE]))
-    whole = machine.components == 2 and all(key in machine.asked for key in ASKED)
     known = () if rig.capture is None else tuple(rig.capture.channels)
-    return names if whole and set(names) <= set(known) else ()
+    return names if set(names) <= set(known) else ()
+
+
+def bounded(rig: RigFile) -> bool:
+    """Whether segments carry vectors, and what the law asks for is recorded: then torque shows its bound."""
+    machine = conventions(rig)
+    known = () if rig.capture is None else tuple(rig.capture.channels)
+    return machine.components == 2 and all(machine.asked.get(key) in known for key in ASKED)
 
 
 def read_swing(recording: Recording[Any], number: object) -> Swing | None:
-    """The capture of a move by its number; None where the rig records none.
+    """The capture of a move by its number; None where there is none, and where it has no number: nothing was captured when
+    it was recorded.
 
     Raises:
         AnalysisError: it is missing.
     """
     names = captured(recording.rig)
-    if not names:
+    if not names or number is None:
         return None
     found = recording.captures(number=number)
     if not found:
@@ -102,7 +128,7 @@ def read_swing(recording: Recording[Any], number: object) -> Swing | None:
     share = machine.sensor_share(rig.geometry["com_to_motor"].value, rig)
     return Swing(
         np.arange(len(data[names[0]])) / found[0].rate_hz,
-        {key: data[machine.asked[key]] for key in ASKED},
+        {key: data[machine.asked[key]] for key in ASKED} if bounded(recording.rig) else {},
         np.array([[data[c] for c in pair] for pair in machine.vectors]),
         stated(rig, "motor.segment_limit").default,
         np.unwrap(data[resolved(rig, [ANGLE])[0]]),
@@ -133,8 +159,11 @@ def largest(swing: Swing, offsets: Array, gains: Array, noise: float) -> Largest
     return Largest(float(size[segment, at]), true[segment, :, at], segment, noise * math.sqrt(2 * math.log(near)))
 
 
-def estimates(where: str, swings: Sequence[Swing], rig: RigFile, bounded: bool) -> dict[str, Estimate]:
-    """`amplitude`, A, and where the torque current is `bounded` `bound_excess`, A: means over the steps of a case."""
+def estimates(where: str, swings: Sequence[Swing], rig: RigFile, at_bound: bool) -> dict[str, Estimate]:
+    """`amplitude`, A, and where the torque current is held `at_bound` `bound_excess`, A: means over the steps of a case;
+    nothing of a motor whose segments carry no vectors."""
+    if not bounded(rig):
+        return {}
     machine = conventions(rig)
     sensors = certified_sensors(rig, {name: name for name in machine.segments})
     gains, offsets = (np.array([[sensors[f"{key}_{c}"].value for c in pair] for pair in machine.vectors])
@@ -144,9 +173,10 @@ def estimates(where: str, swings: Sequence[Swing], rig: RigFile, bounded: bool) 
     out = {"amplitude": _scattered(f"amplitude/{where}", [f.amplitude for f in found]) - floor / 2
            + _within(f"noise/amplitude/{where}", "noise in the greatest amplitude", floor / 2)}  # fmt: skip
     out["amplitude"] = out["amplitude"] + _sensed(found, machine, sensors)
-    if bounded:
-        rounding = _within(f"rounding/{where}", "rounding of what the law tells", ROUNDING_A)
-        out["bound_excess"] = Estimate.exact(float(np.mean([s.excess for s in swings])), "A") + rounding
+    if at_bound:  # the greatest of many lies in the upper half of what rounding does
+        half = float(np.mean([s.rounding for s in swings])) / 2
+        rounding = _within(f"rounding/{where}", "rounding of what the law tells", half)
+        out["bound_excess"] = Estimate.exact(float(np.mean([s.excess for s in swings])) - half, "A") + rounding
     return out
 
 

@@ -31,9 +31,9 @@ def all_figures(moves: Sequence[Done], results: Mapping[Case, Result], rig: RigF
         *(figure for c in largest for figure in _currents(first[c], limit)),
         *_peaks(results),
     ]
-    return (
-        sorted(drawn, key=lambda f: FIRST.index(f.key) if f.key in FIRST else len(FIRST)) if moves[0].swing else drawn
-    )
+    if moves[0].swing is None or not moves[0].swing.asked:
+        return drawn
+    return sorted(drawn, key=lambda f: FIRST.index(f.key) if f.key in FIRST else len(FIRST))
 
 
 def _called(done: Done, moves: Sequence[Done]) -> str:
@@ -79,7 +79,7 @@ def _radii(moves: Sequence[Done]) -> Figure:
 def _currents(done: Done, limit: float) -> Iterator[Figure]:
     """The segments' amplitudes; where a capture has them as vectors, the torque current within its bound and their sizes."""
     swing, name = done.swing, done.case.allocation
-    if swing is None:
+    if swing is None or not swing.asked:
         yield _segments(done, limit)
         return
     shown, most = swing.t <= SHOWN_S, 2 * swing.limit

@@ -194,9 +194,9 @@ def requires(rig: RigFile) -> Requires:
         lacks=machine.lacks,
         roles=("levitation", "rotation"),
         channels=(*channels(machine), *wiring.channels(machine)),
-        sensors=(*positions(machine), *(machine.segments if bounds.captured(rig) else ())),
+        sensors=(*positions(machine), *(machine.segments if bounds.bounded(rig) else ())),
         parameters=needed(rig, *hold.NEEDED, *wiring.needs(rig), *NEEDED),
-        uses=("capture",) if machine.components == 2 else (),
+        uses=("capture",),
         machine=("polar_inertia",),
     )
 
@@ -214,7 +214,7 @@ procedure = Procedure(
     requires=requires,
     check=check,
     settings=settings,
-    untold=lambda rig: () if bounds.captured(rig) else CAPTURED,
+    untold=lambda rig: () if bounds.bounded(rig) else CAPTURED,
     left_out=lambda plan: () if "priority" in plan.allocations else (BOUND,),
     step_count=step_count,
     steps_on=lambda rig, plan: step_count(plan) - wiring.STEPS + wiring.steps(rig),

@@ -55,7 +55,7 @@ STEADY_RAD = (
 
 def needs(_: Plan) -> tuple[Need, ...]:
     """The motor's direct force constant: the ratio alone gives no newtons."""
-    return (Need("force-constant"),)
+    return (Need("force-constant", facts=("alpha_d@0",)),)
 
 
 def step_count(plan: Plan) -> int:

@@ -86,7 +86,11 @@ def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
 
 def needs(_: Plan) -> tuple[Need, ...]:
     """What the prediction is made of."""
-    return (Need("force-constant"), Need("negative-stiffness"), Need("force-coupling"))
+    return (
+        Need("force-constant", facts=("alpha_d", "alpha_d@0", "alpha_dx")),
+        Need("negative-stiffness", facts=("alpha_x_prime",)),
+        Need("force-coupling", facts=("alpha_c", "gamma_0")),
+    )
 
 
 def step_count(plan: Plan) -> int:

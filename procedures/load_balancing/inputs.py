@@ -12,7 +12,12 @@ from procedures.load_balancing.plan import Plan
 from procedures.servomotor.conventions import conventions
 from procedures.shared.certificates import certified, certified_gain, certified_sensors
 
-USED = ("force-constant", "negative-stiffness", "force-coupling")
+USED: Mapping[str, tuple[str, ...]] = {
+    "force-constant": ("alpha_d", "alpha_dx"),
+    "negative-stiffness": ("alpha_x_prime",),
+    "force-coupling": ("alpha_c", "alpha_ratio", "gamma_0"),
+}
+"""The calibrations, and what is taken of each."""
 MODEL = ("alpha_d", "alpha_c", "stiffness")
 LENGTHS = {"l_is": "com_to_inboard_sensor", "l_os": "com_to_outboard_sensor", "l_ia": "com_to_inboard_amb",
            "l_m": "com_to_motor"}  # fmt: skip

@@ -69,7 +69,7 @@ def settings(rig: RigFile, _: Plan) -> dict[str, float]:
 
 def needs(_: Plan) -> tuple[Need, ...]:
     """The motor's constants: what the controller is told, and what the prediction is made of."""
-    return tuple(Need(name) for name in inputs.USED)
+    return tuple(Need(name, facts=facts) for name, facts in inputs.USED.items())
 
 
 def step_count(plan: Plan) -> int:

@@ -77,7 +77,10 @@ def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
 def needs(plan: Plan) -> tuple[Need, ...]:
     """The drag in the same state of the AMBs, and the torque constant."""
     del plan
-    return (Need("spindown", {"motor_carries": 1.0}), Need("torque-constant"))
+    return (
+        Need("spindown", {"motor_carries": 1.0}, facts=("B", "B_high", "T_c", "J_z")),
+        Need("torque-constant", facts=("alpha_tau", "gamma_0t")),
+    )
 
 
 def step_count(plan: Plan) -> int:

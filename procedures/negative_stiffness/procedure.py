@@ -62,7 +62,10 @@ def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
 
 def needs(plan: Plan) -> tuple[Need, ...]:
     """Force constants of the outboard AMB at this bias, and of the motor."""
-    return (Need("amb-calibration", {"bias_A": plan.bias_A}), Need("force-constant"))
+    return (
+        Need("amb-calibration", {"bias_A": plan.bias_A}),
+        Need("force-constant", facts=("alpha_d", "alpha_d@0", "alpha_dx")),
+    )
 
 
 def step_count(plan: Plan) -> int:

@@ -50,7 +50,7 @@ def settings(rig: RigFile, _: Plan) -> dict[str, float]:
 
 def needs(plan: Plan) -> tuple[Need, ...]:
     """The torque constant, where the plan asks for its calibration."""
-    return (Need("torque-constant"),) if plan.torque_constant == "calibration" else ()
+    return (Need("torque-constant", facts=("alpha_tau",)),) if plan.torque_constant == "calibration" else ()
 
 
 def step_count(plan: Plan) -> int:

@@ -117,7 +117,9 @@ def test_the_response_is_that_of_the_loop_with_the_true_machine(tmp_path: Path) 
     rise = (int(np.argmax(np.array(y) > 0.9)) - int(np.argmax(np.array(y) > 0.1))) * 1e-4
     where = "priority, 4°, 20 Hz"
     overshoot = measured["overshoot", where]
-    assert overshoot.value == pytest.approx(max(y) - 1, abs=3 * overshoot.u + 0.02)  # amplifier and sampling lag: 2 %
+    begins = math.pi / 4096 / size  # within half a count of where the reference stood
+    # amplifier and sampling lag: 2 %
+    assert overshoot.value == pytest.approx(max(y) - 1, abs=3 * overshoot.u + 0.02 + begins)
     assert measured["rise_time", where].value == pytest.approx(rise, abs=3 * measured["rise_time", where].u + 0.5e-3)
 
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from sim_backend.machine import Truth
 from sim_backend.machines.tsbs.balancing import circle
 from sim_backend.machines.tsbs.quantities import drag_of
+from sim_backend.machines.tsbs.truth_angle import angle_steps
 from sim_backend.machines.tsbs.truth_speed import speeds
 from sim_backend.motion import DragAsked, Motions
 
@@ -22,4 +23,4 @@ def drag(drawn: Truth, asked: DragAsked) -> Mapping[str, float]:
     return {"B": low, "B_high": high, "T_c": p.coulomb, "J_z": p.polar_inertia}
 
 
-MOTIONS = Motions(circle=circle, drag=drag, speeds=speeds)
+MOTIONS = Motions(circle=circle, drag=drag, speeds=speeds, angle=angle_steps)

@@ -18,7 +18,6 @@ from sim_backend.machines.tsbs import machine, quantities
 from sim_backend.machines.tsbs.machine import TSBS
 from sim_backend.machines.tsbs.params import PlantParams
 from sim_backend.machines.tsbs.plant import CHANNELS, TRACE
-from sim_backend.machines.tsbs.truth_angle import angle_steps
 
 PAIRS = ("i_q1", "i_d1", "i_q2", "i_d2")
 CALLED = dict(zip(machine.SEGMENTS, PAIRS, strict=True))
@@ -53,5 +52,5 @@ def constants(p: PlantParams, settings: Mapping[str, float]) -> dict[str, float]
 TSBS6 = replace(
     TSBS, name="tsbs6", stated=stated, defects=DEFECTS, params=params, quantities=constants, channels=TOLD,
     places=partial(machine.places, channels=TOLD), spoil=partial(machine.spoil, first=PAIRS[0]), traced=lambda _: TRACED,
-    motions=replace(TSBS.motions, angle=angle_steps, speeds=None),
+    motions=replace(TSBS.motions, speeds=None),
 )  # fmt: skip

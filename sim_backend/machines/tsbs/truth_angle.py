@@ -42,13 +42,42 @@ def angle_steps(rig: RigFile, drawn: Truth, asked: AngleAsked) -> Mapping[tuple[
     """Means over the steps by quantity and case. Each step begins where the one before has left the angle and its integrator,
     so that the order is that of the run."""
     found: dict[tuple[str, str], list[float]] = {}
+    paths: dict[str, list[_Path]] = {}
     for replica in range(REPLICAS):
         machine = _Carried(rig, drawn, asked, (drawn.noise + SEED * (1 + replica)) % 2**63)
+        idle = iter(asked.idle)
         for where, case in asked.cases.items():
             for k in range(2 * asked.repeats):
-                for name, value in machine.moved(case, k):
+                path, values = machine.moved(case, k, next(idle, 0.0))
+                paths.setdefault(where, []).append(path)
+                for name, value in values:
                     found.setdefault((name, where), []).append(value)
-    return {key: float(np.mean(values)) for key, values in found.items()}
+    true = {key: float(np.mean(values)) for key, values in found.items()}
+    return true | {(name, where): value for where, p in paths.items() for name, value in _peaks(p)}
+
+
+@dataclasses.dataclass(frozen=True)
+class _Path:
+    """The shaft of one step, `forward` or back: `planes` (2, 2, n) m from when the torque current answers, and its mean place
+    before, `rest` (2, 2) m."""
+
+    forward: bool
+    planes: Array
+    rest: Array
+
+
+def _peaks(paths: list[_Path]) -> Iterator[tuple[str, float]]:
+    """Of the mean path each way, as a mean over both ways: what the noise of one step does is none of the machine's."""
+    ends = []
+    for way in (True, False):
+        of = [p for p in paths if p.forward is way]
+        n = min(p.planes.shape[-1] for p in of)
+        path, rest = np.mean([p.planes[..., :n] for p in of], axis=0), np.mean([p.rest for p in of], axis=0)
+        ends.append((np.hypot(path[:, 0], path[:, 1]).max(axis=-1), np.hypot(rest[:, 0], rest[:, 1])))
+    peaks, at_rest = np.mean(ends, axis=0)
+    yield "peak_outboard", float(peaks[0])
+    yield "excess", float(peaks[0] - at_rest[0])
+    yield "peak_motor", float(peaks[1])
 
 
 @dataclasses.dataclass(frozen=True)
@@ -89,11 +118,11 @@ class _Carried:
     def _wait(self, seconds: float) -> None:
         self.plant.run(round(seconds / TICK_S))
 
-    def moved(self, case: AngleCase, k: int) -> Iterator[tuple[str, float]]:
-        """One step, to the angle (even `k`) or back."""
+    def moved(self, case: AngleCase, k: int, idle_s: float) -> tuple[_Path, list[tuple[str, float]]]:
+        """One step, to the angle (even `k`) or back, after nothing was recorded for `idle_s`."""
         if k == 0:
             self._write(case.settings)
-            self._wait(self.asked.standstill_s)
+        self._wait(max(idle_s, self.asked.standstill_s if k == 0 else 0.0))
         rest = self._recorded(self.asked.standstill_s)
         way = 1 if k % 2 == 0 else -1
         target = case.size if way > 0 else 0.0
@@ -103,23 +132,17 @@ class _Carried:
         tail, later = self._standing(TAIL_S)
         torque = after.trace[:, SEGMENTS[:: 2 if self.p.phases == 6 else 1]].mean(axis=1)
         first = int(np.argmax(np.abs(torque) > ANSWERS * np.abs(torque).max()))
-        yield from _response(way * (after.angle - (target - way * case.size)), first, case)
-        yield "final_error", tail - target
-        peaks, at_rest = (np.hypot(x[..., 0, :], x[..., 1, :]).max(axis=-1) for x in (after.planes, rest.planes))
-        yield from (
-            ("peak_outboard", float(peaks[0])),
-            ("excess", float(peaks[0] - at_rest[0])),
-            ("peak_motor", float(peaks[1])),
-        )
+        values = list(_response(way * (after.angle - (target - way * case.size)), first, case))
+        values.append(("final_error", tail - target))
         if self.p.phases == 6:
-            yield "saturated", _cut(after.trace, self.p.segment_limit)
+            values.append(("saturated", _cut(after.trace, self.p.segment_limit)))
+            values.append(("amplitude", self._amplitude(after.trace)))
         else:
             flags = np.concatenate([after.flags, *(rows[:, -1].astype(np.int64) for rows in (late, later))])
-            yield "saturated", float((flags & SEGMENT_SATURATED != 0).sum()) * PERIOD_TICKS * TICK_S
-        if self.p.phases == 6:
-            yield "amplitude", self._amplitude(after.trace)
+            values.append(("saturated", float((flags & SEGMENT_SATURATED != 0).sum()) * PERIOD_TICKS * TICK_S))
         if case.bounded:
-            yield "bound_excess", _beyond(after.trace, self.asked.limit)
+            values.append(("bound_excess", _beyond(after.trace, self.asked.limit)))
+        return _Path(way > 0, after.planes[..., first:], rest.planes.mean(axis=-1)), values
 
     def _standing(self, seconds: float) -> tuple[float, Array]:
         """The mean angle, rad, and the telemetry."""
@@ -168,8 +191,11 @@ def _response(y: Array, first: int, case: AngleCase) -> Iterator[tuple[str, floa
     low, high = (int(np.argmax(y > share * case.size)) for share in (0.1, 0.9))
     yield "rise_time", (high - low) * TICK_S
     yield "overshoot", max(float(y.max()) / case.size - 1, 0.0)
-    outside = np.flatnonzero(np.abs(y - case.size) > case.band)
-    yield "settling_time", (float(outside[-1]) + 1 - first) * TICK_S if len(outside) else 0.0
+    size = np.abs(y - case.size)
+    outside = np.flatnonzero(size > case.band)
+    k = int(outside[-1]) if len(outside) else first
+    part = (size[k] - case.band) / (size[k] - size[k + 1]) if size[k] > case.band else 0.0
+    yield "settling_time", (k + float(part) - first) * TICK_S
 
 
 def _cut(trace: Array, limit: float) -> float:
