@@ -84,20 +84,27 @@ def rates(runs: Sequence[RunDown], coast: Callable[[RunDown], Coast]) -> Rates:
     values = {d: np.array([[c.b, c.c] for c in found]) for d, found in ways.items()}
     expected = np.mean([c.covariance for found in ways.values() for c in found], axis=0)
     apart = np.concatenate([v - v.mean(axis=0) for v in values.values()])
-    dof = sum(len(v) - 1 for v in values.values())
     root = np.linalg.cholesky(expected)
     white = np.linalg.solve(root, apart.T)
-    ratio = float((white**2).sum() / (2 * dof)) if dof else 1.0
+    dof = 2 * sum(len(v) - 1 for v in values.values())
+    alike = [np.array([c.shared for c in found]) for found in ways.values()]
+    if alike[0].any():  # what all share makes them differ, too, and is in the mean by itself
+        beside = np.concatenate([np.linalg.solve(root, s - s.mean(axis=0)) for s in alike])
+        beside = beside.reshape(white.size, -1)
+        white = white.T.ravel() - beside @ np.linalg.lstsq(beside, white.T.ravel(), rcond=None)[0]
+        dof -= beside.shape[1]
+    ratio = float((white**2).sum() / dof) if dof > 0 else 1.0
     means = {d: v.mean(axis=0) for d, v in values.items()}
     share = sum(1 / len(v) for v in values.values()) / 4
     wide = max(ratio, 1.0)
+    shared = sum((s.mean(axis=0) for s in alike), np.zeros((2, 1))) / 2
     return Rates(
         (means[1] + means[-1]) / 2,
-        expected * wide * share,
-        RESIDUAL_DOF if wide == 1.0 else 2.0 * dof,
+        expected * wide * share + shared @ shared.T,
+        RESIDUAL_DOF if wide == 1.0 else float(dof),
         means,
         ratio,
-        2 * dof,
+        max(dof, 0),
     )
 
 

@@ -15,7 +15,7 @@ J_r, comes J as well: J = J_r b_r / (b - b_r).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -36,6 +36,8 @@ class Coast:
     speed: float
     covariance: Array
     fit: Fit
+    shared: Array = field(default_factory=lambda: np.zeros((2, 1)))
+    """What standard uncertainties that all run-downs share do to b and c, (2, k): `procedures.spindown.waves`."""
 
 
 def speed(t: Array, b: float, c: float, start: float) -> Array:

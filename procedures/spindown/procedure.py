@@ -6,6 +6,7 @@ rotor, mean over both directions of turning: J_z w' = -B w - T_c sgn(w).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
@@ -19,12 +20,13 @@ from bench.procedure.states import transition
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
+from bench.rigfile.roles import ANGLE
 from bench.uncertainty import Estimate
 from procedures.servomotor import carrying, hold, segments, wiring
 from procedures.servomotor.conventions import conventions
 from procedures.servomotor.parameters import BIASES, chosen, named, needed, write
 from procedures.shared import assumptions
-from procedures.spindown import checks, coasting, estimates
+from procedures.spindown import checks, coasting, estimates, waves
 from procedures.spindown import figures as drawn
 from procedures.spindown.coasting import Coasted
 from procedures.spindown.estimates import Drag
@@ -140,6 +142,8 @@ def _run_down(rig: Rig, plan: Plan, record: Recorder, labels: Mapping[str, objec
     rig.clock.sleep(RAMP_S)
     with record.step("spin", speed_rad_s=reached, **labels):
         rig.clock.sleep(plan.steady_s)
+    if plan.motor_carries:
+        _wait_for(rig, direction, 2 * math.pi * int(str(labels["repeat"])) / plan.repeats)
     if by == "drive":
         let_go(rig, by)
     with record.step("coast", ring=labels["group"] == "ring", **labels):
@@ -154,6 +158,13 @@ def _run_down(rig: Rig, plan: Plan, record: Recorder, labels: Mapping[str, objec
             rig.clock.sleep(0.05)
     rig.rotation.stop()  # the speed reference that SPIN set is gone before the gains come back
     return abs(reached)
+
+
+def _wait_for(rig: Rig, direction: int, place: float) -> None:
+    """Until the turning rotor comes to a place, rad within a turn, as exactly as a link's answers allow: what goes round with
+    it acts the other way where a run-down begins half a turn later, so that repeats spread over a turn are free of it."""
+    ahead = direction * (place - rig.levitation.reading(ANGLE)) % (2 * math.pi)
+    rig.clock.sleep(ahead / max(abs(rig.rotation.speed_rad_s), 1.0))
 
 
 def _hold_slowly(rig: Rig, plan: Plan, record: Recorder, labels: Mapping[str, object], wanted: float) -> None:
@@ -181,6 +192,9 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis | Coast
         return coasting.evaluate(recording, findings)
     findings.gate([*checks.before_fits(recording), *segments.of_nudges(recording)])
     plan, rig, runs = recording.plan, recording.rig, read_run_downs(recording)
+    if plan.motor_carries:
+        findings.add(waves.of_places(runs))
+        runs = waves.freed(runs) if waves.spread(runs) else runs
     angle = estimates.evaluate(runs, rig, "angle", plan)
     whole = all(r.of_speed is not None for r in runs)
     speed = estimates.evaluate(runs, rig, "speed", plan) if whole else None

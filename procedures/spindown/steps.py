@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -44,8 +44,8 @@ def channels(machine: Servomotor) -> tuple[str, ...]:
 @dataclass(frozen=True)
 class RunDown:
     """One coast. `t` (n,) s from the first sample used, `speed` (n,) rad/s and `angle` (n,) rad in the direction of turning;
-    fits of both, of a short one of the angle alone; mean coil currents A by channel; mean segment currents (4,) A; the speed
-    before it was let go."""
+    fits of both, of a short one of the angle alone; mean coil currents A by channel; mean segment currents (4,) A; `around`
+    (n,) rad, where the rotor stands."""
 
     bias_A: float
     direction: int
@@ -61,6 +61,7 @@ class RunDown:
     lost: int
     expected: int
     flags: int
+    around: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def where(self) -> str:
@@ -107,6 +108,7 @@ def _read(step: Step, machine: Servomotor, delay_s: float, end: float) -> RunDow
         coils={c: float(data[c][used].mean()) for c in coils(machine)},
         segments=np.array([float(data[c][used].mean()) for c in machine.segments]),
         lost=step.lost(), expected=step.expected(), flags=int(np.bitwise_or.reduce(data[STATUS].astype(np.int64))),
+        around=data[ANGLE][used],
     )  # fmt: skip
 
 
