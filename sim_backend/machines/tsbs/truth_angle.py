@@ -194,7 +194,8 @@ def _response(y: Array, first: int, case: AngleCase) -> Iterator[tuple[str, floa
     size = np.abs(y - case.size)
     outside = np.flatnonzero(size > case.band)
     k = int(outside[-1]) if len(outside) else first
-    part = (size[k] - case.band) / (size[k] - size[k + 1]) if size[k] > case.band else 0.0
+    inside = len(outside) and k + 1 < len(size)  # else it is never outside, or still is at the end
+    part = (size[k] - case.band) / (size[k] - size[k + 1]) if inside else float(len(outside) > 0)
     yield "settling_time", (k + float(part) - first) * TICK_S
 
 
