@@ -53,6 +53,7 @@ NEEDED = (
     "angle.derivative_on_error",
     "angle.slew",
 )
+UPLOAD_S = 0.5  # what the upload of a capture is given at least
 CODES = {"static": 0.0, "priority": 1.0}
 
 
@@ -93,10 +94,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
                 rig.clock.sleep(plan.standstill_s)
                 _step(rig, target)
                 rig.clock.sleep(plan.record_s)
-            if bounds.captured(rig.file):
-                assert rig.capture is not None
-                rig.capture.wait(5.0)
-                rig.capture.upload(None, number=number)
+            _uploaded(rig, number)
             number += 1
     carrying.give_back(rig, 0.2)
     write(rig, {"angle.slew": stated(rig.file, "angle.slew").default})
@@ -111,6 +109,18 @@ def carried(rig: RigFile, plan: Plan) -> dict[str, float]:
 def _numbered(rig: RigFile, number: int) -> dict[str, int]:
     """By which a move has its capture."""
     return {"number": number} if bounds.captured(rig) else {}
+
+
+def _uploaded(rig: Rig, number: int) -> None:
+    """The capture of a step, where there is one. The next begins as long after this one over a fast link as over a slow one,
+    for the angle's integrator goes on learning."""
+    if not bounds.captured(rig.file):
+        return
+    assert rig.capture is not None
+    ended = rig.clock.now_ns()
+    rig.capture.wait(5.0)
+    rig.capture.upload(None, number=number)
+    rig.clock.sleep(max(UPLOAD_S - 1e-9 * (rig.clock.now_ns() - ended), 0.0))
 
 
 def _step(rig: Rig, target: float) -> None:
