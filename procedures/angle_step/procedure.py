@@ -234,6 +234,7 @@ procedure = Procedure(
         "raised/*",
         "ticks/*",
         "edges/*",
+        "standing/*",
         "rounding/*",
     ),  # both are read from the recording itself
     assumes=assumptions.ANGLE_STEP,

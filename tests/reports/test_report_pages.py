@@ -106,3 +106,11 @@ def test_one_day_is_said_once() -> None:
         "2026-01-01 23:59:00 to 2026-01-02 00:01:00 UTC"
     )
     assert text.span("2026-01-01T00:00:00+00:00", None) == "2026-01-01 00:00:00 UTC, end not recorded"
+
+
+@pytest.mark.parametrize(("judged", "rows"), [(2, 2), (10, 1), (10, 12), (16, 4)])
+def test_the_pages_settle(judged: int, rows: int) -> None:
+    """A table that asks where it stands, and goes to the next page for it, would go back and forth: then typst gives up, and
+    each page says that it is the first."""
+    _, warnings = typst.Compiler(pdf.sources(crowded(judged, rows))).compile_with_warnings()
+    assert [w.message for w in warnings] == []
