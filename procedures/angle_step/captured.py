@@ -26,9 +26,7 @@ from procedures.shared.certificates import certified_gain
 
 Array = npt.NDArray[np.float64]
 WAYS = (True, False)  # to the angle, and back
-CROSSING = (
-    1 / 3
-)  # of a tick: a time between two edges has 2/3 of the variance of a tick, the two of a rise together 4/3
+CROSSING = math.sqrt(2 / 3 / 12)  # of a tick: a time between two edges has 2/3 of the variance of one within a tick
 
 
 def by_case(
