@@ -23,6 +23,7 @@ from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.rigfile.roles import ANGLE, resolved
 from bench.uncertainty import Estimate, Influence
+from procedures.angle_step.budget import within
 from procedures.servomotor.conventions import Servomotor, conventions, displacement
 from procedures.servomotor.parameters import stated
 from procedures.shared.certificates import certified_sensors
@@ -171,11 +172,11 @@ def estimates(where: str, swings: Sequence[Swing], rig: RigFile, at_bound: bool)
     found = [largest(s, offsets, gains, noise_of(rig, machine.segments, 1 / float(s.t[1]))) for s in swings]
     floor = float(np.mean([f.floor for f in found]))
     out = {"amplitude": _scattered(f"amplitude/{where}", [f.amplitude for f in found]) - floor / 2
-           + _within(f"noise/amplitude/{where}", "noise in the greatest amplitude", floor / 2)}  # fmt: skip
+           + within(f"noise/amplitude/{where}", "noise in the greatest amplitude", floor / 2, "A")}  # fmt: skip
     out["amplitude"] = out["amplitude"] + _sensed(found, machine, sensors)
     if at_bound:  # the greatest of many lies in the upper half of what rounding does
         half = float(np.mean([s.rounding for s in swings])) / 2
-        rounding = _within(f"rounding/{where}", "rounding of what the law tells", half)
+        rounding = within(f"rounding/{where}", "rounding of what the law tells", half, "A")
         out["bound_excess"] = Estimate.exact(float(np.mean([s.excess for s in swings])) - half, "A") + rounding
     return out
 
@@ -205,9 +206,3 @@ def _scattered(identity: str, values: Sequence[float]) -> Estimate:
     influence = Influence(id=f"scatter/{identity}", name="scatter of the repeats", u=u, unit="A", kind="A",
                           distribution="normal", dof=float(len(values) - 1), source=f"{len(values)} steps")  # fmt: skip
     return Estimate.of(float(np.mean(values)), influence)
-
-
-def _within(identity: str, name: str, half: float) -> Estimate:
-    """Zero, within a half width."""
-    influence = Influence(id=identity, name=name, u=half / math.sqrt(3), unit="A", kind="B", distribution="rectangular")
-    return Estimate.of(0.0, influence)
