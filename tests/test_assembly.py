@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from bench.link.codec import encode
 from bench.link.frames import FrameBatch, empty_batch, frame
-from bench.link.sample_assembler import KEPT, Assembler, Joiner, Rows, _Sample
+from bench.link.joining import KEPT, Joiner, Sample
+from bench.link.sample_assembler import Assembler, Rows
 from bench.link.telemetry import TelemetryDecoder
 from bench.rigfile import load_rig
 
@@ -163,7 +164,7 @@ def test_no_row_is_made_of_parts_of_different_samples(
         assert (s.sequence, s.tick) == (s.arrived & 0xFFFF, 10 * s.arrived)
 
 
-def delayed(bits: int, start: int, lateness: list[int]) -> tuple[Joiner, list[_Sample]]:
+def delayed(bits: int, start: int, lateness: list[int]) -> tuple[Joiner, list[Sample]]:
     """A SYNC for each lateness; part 1 of a sample comes so many samples after its SYNC, part 2 with it."""
     joiner, done = Joiner(16, [bits] * 2), []
     due = sorted((k + late, k) for k, late in enumerate(lateness))
@@ -231,3 +232,32 @@ def test_arbitrary_bytes_never_crash(frames: list[tuple[int, bytes]]) -> None:
     rows = Assembler(PLAIN).take(joined(*(frame(i, d) for i, d in frames)))
     assert isinstance(rows, Rows)
     assert all(len(column) == len(rows) for column in rows.columns.values())
+
+
+@settings(deadline=None, max_examples=150)
+@given(
+    order=st.permutations(MESSAGES),
+    start=st.integers(65_500, 65_540),
+    steps=st.lists(st.sampled_from([1] * 20 + [2, 17, -30_000]), min_size=2, max_size=30),
+    faults=st.lists(st.tuples(st.integers(0, 149), st.sampled_from(["lost", "doubled", "later"])), max_size=3),
+    cut=st.integers(1, 150),
+)
+def test_a_batch_gives_what_its_frames_give_one_by_one(
+    order: list[str], start: int, steps: list[int], faults: list[tuple[int, str]], cut: int
+) -> None:
+    numbers = (start + np.cumsum(steps)).tolist()
+    told = {"AmbPos": "XA", "AmbCurX": "IXA_pos", "AmbRest": "RotorSpeed"}
+    frames = [part(m, n, **({told[m]: float(n % 64)} if m in told else {})) for n in numbers for m in order]
+    for at, kind in (x for x in faults if x[0] < len(frames) - 1):
+        frames[at : at + 2] = {"lost": [frames[at + 1]], "doubled": [frames[at], *frames[at : at + 2]],
+                               "later": [frames[at + 1], frames[at]]}[kind]  # fmt: skip
+    single, several = Assembler(PLAIN), Assembler(PLAIN)
+    expected = [single.take(f) for f in frames]
+    found = [several.take(joined(*frames[:cut])), several.take(joined(*frames[cut:]))]
+    for field in ("sequence", "tick", "arrived"):
+        assert np.concatenate([getattr(r, field) for r in found]).tolist() == \
+            np.concatenate([getattr(r, field) for r in expected]).tolist()  # fmt: skip
+    for name in PLAIN.channels:
+        assert np.concatenate([r.columns[name] for r in found]).tolist() == \
+            np.concatenate([r.columns[name] for r in expected]).tolist()  # fmt: skip
+    assert several.misplaced == single.misplaced

@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from bench.errors import ConfigError
 from bench.link.frames import FrameBatch
+from bench.link.windows import Places, fits, places, widened
 from bench.rigfile.messages import Message, Signal
 
 Array = npt.NDArray[np.float64]
@@ -30,9 +31,8 @@ class Decoder:
 
     def __init__(self, message: Message) -> None:
         self.message = message
-        groups = grouped(message)
-        self._extractors = [_extractor(group) for group in groups]
-        self._signals = [s for group in groups for s in group]
+        self._signals, groups, self._places = laid_out(message)
+        self._extractors = [(row, *_extractor(group)) for row, group in groups]
         self.names = tuple(s.name for s in self._signals)
         self._scales = np.array([s.scale for s in self._signals])[:, None]
         self._offsets = np.array([s.offset for s in self._signals])[:, None]
@@ -69,10 +69,12 @@ class Decoder:
     def table(self, payloads: Payloads) -> Array:
         """Values (signals, n) of such payloads."""
         out = np.empty((len(self.names), len(payloads)))
-        row = 0
-        for count, extract in self._extractors:
+        for row, count, extract in self._extractors:
             out[row : row + count] = extract(payloads)
-            row += count
+        if self._places:
+            wide = widened(payloads[:, : self.message.length])
+            for p in self._places:
+                out[p.rows] = p.read(wide)
         out *= self._scales
         if self._shifted:
             out += self._offsets
@@ -106,6 +108,17 @@ def grouped(message: Message) -> list[list[Signal]]:
         list(g)
         for _, g in groupby(ordered, key=lambda s: (aligned_type(s) or s.name, place[s.name] if aligned_type(s) else 0))
     ]
+
+
+def laid_out(message: Message) -> tuple[list[Signal], list[tuple[int, list[Signal]]], list[Places]]:
+    """The signals of a message in the order of the rows of a table; of these the groups, with their first rows, that are read
+    by a view or bit by bit; and the places of the others, which are read by their windows."""
+    groups = grouped(message)
+    rows = [sum(map(len, groups[:k])) for k in range(len(groups))]
+    lone = [len(g) == 1 and fits(g[0], bytes_of) for g in groups]
+    rest = [(row, g) for row, g, apart in zip(rows, groups, lone, strict=True) if not apart]
+    windowed = [(row, g[0]) for row, g, apart in zip(rows, groups, lone, strict=True) if apart]
+    return [s for g in groups for s in g], rest, list(places(windowed, bytes_of))
 
 
 def _extractor(group: list[Signal]) -> tuple[int, Extractor]:

@@ -8,10 +8,10 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from bench.link.codec import FLOATS, Array, Payloads, aligned_type, bits_of, bytes_of, grouped
+from bench.link.codec import FLOATS, Array, Payloads, aligned_type, bits_of, bytes_of, laid_out
+from bench.link.windows import SIDE, Words
 from bench.rigfile.messages import Message, Signal
 
-Words = npt.NDArray[np.uint64]
 Codes = npt.NDArray[Any]
 _LARGEST: Final = {16: 65504.0, 32: float(2**128 - 2**104), 64: sys.float_info.max}
 
@@ -21,8 +21,7 @@ class Encoder:
 
     def __init__(self, message: Message) -> None:
         self.message = message
-        self._groups = grouped(message)
-        signals = [s for group in self._groups for s in group]
+        signals, self._groups, self._places = laid_out(message)
         self.names = tuple(s.name for s in signals)
         self._scales = np.array([s.scale for s in signals])[:, None]
         self._offsets = np.array([s.offset for s in signals])[:, None]
@@ -30,7 +29,7 @@ class Encoder:
         limits = [_limits(s) for s in signals]
         self._low, self._high = (np.array([x[k] for x in limits])[:, None] for k in (0, 1))
         self._whole = np.array([not s.is_float for s in signals])
-        self._all_whole = bool(self._whole.all())
+        self._all_whole, self._all_float = bool(self._whole.all()), not self._whole.any()
 
     def table(self, values: Array) -> Payloads:
         """Payloads (n, message.length) of values (signals, n) in the signals' units.
@@ -45,11 +44,14 @@ class Encoder:
         else:
             raw[self._whole] = np.rint(raw[self._whole])
         np.clip(raw, self._low, self._high, out=raw)
-        out = np.zeros((raw.shape[1], self.message.length), np.uint8)
-        row = 0
-        for group in self._groups:
+        wide = np.zeros((raw.shape[1], self.message.length + 2 * SIDE), np.uint8)
+        out = wide[:, SIDE:-SIDE]
+        if not self._all_float:
+            np.copyto(raw, 0.0, where=self._whole[:, None] & np.isnan(raw))
+        for p in self._places:
+            p.write(wide, raw[p.rows].astype(np.int64))
+        for row, group in self._groups:
             _write(out, group, raw[row : row + len(group)])
-            row += len(group)
         return out
 
 
@@ -62,8 +64,8 @@ def put(payloads: Payloads, s: Signal, raw: Codes) -> None:
     for k, byte in enumerate(order):  # least significant first
         shift = 8 * k - first_bit
         held = (mask >> shift if shift >= 0 else mask << -shift) & 0xFF
-        part = word >> np.uint64(shift) if shift >= 0 else word << np.uint64(-shift)
-        payloads[:, byte] = (payloads[:, byte] & np.uint8(0xFF ^ held)) | (part & np.uint64(held)).astype(np.uint8)
+        part = (word >> np.uint64(shift) if shift >= 0 else word << np.uint64(-shift)).astype(np.uint8)
+        payloads[:, byte] = part if held == 0xFF else (payloads[:, byte] & np.uint8(0xFF ^ held)) | part
 
 
 def taken(payloads: Payloads, s: Signal) -> Words:
@@ -89,14 +91,13 @@ def _write(out: Payloads, group: list[Signal], raw: Array) -> None:
         low = first.start // 8
         high = low + len(group) * first.length // 8
         with np.errstate(invalid="ignore"):
-            numbers = raw if first.is_float else np.nan_to_num(raw, nan=0.0)
-            out[:, low:high].view(kind)[:] = numbers.T
+            out[:, low:high].view(kind)[:] = raw.T
         return
     numbers = raw[0]
     if first.is_float:
         bits = np.ascontiguousarray(numbers.astype(FLOATS[first.length])).view(f"<u{first.length // 8}")
         put(out, first, bits.astype(np.uint64))
     elif first.signed:
-        put(out, first, np.nan_to_num(numbers, nan=0.0).astype(np.int64))
+        put(out, first, numbers.astype(np.int64))
     else:
-        put(out, first, np.nan_to_num(numbers, nan=0.0).astype(np.uint64))
+        put(out, first, numbers.astype(np.uint64))

@@ -1,19 +1,13 @@
 """From telemetry frames to rows of values: one message a sample (CAN FD, serial), or several on classic CAN.
 
 On classic CAN the first message (SYNC) carries sequence and tick, each other one the low bits of the sequence it belongs
-to. A sample is complete when all its messages came; one that stays incomplete is lost and shows as a gap.
-
-Low bits alone do not say which sample a message belongs to: after a loss of 16 samples a count of 4 bits is the same
-again. So messages wait for the next SYNC, which says how far the sequence went on meanwhile. A count is then read as the
-sample of that SYNC or one of a few before it, never one that is yet to come; the counts between are left out and
-counted. So a row is never made of parts of different samples, as long as no message comes later than its count goes
-round, less the sample that is due: 14 samples with 4 bits. What is later than that, no reader can tell from the count.
+to. A sample is complete when all its messages came; one that stays incomplete is lost and shows as a gap
+(`bench.link.joining`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -22,12 +16,12 @@ import numpy.typing as npt
 from bench import units
 from bench.link.codec import Decoder
 from bench.link.frames import FrameBatch
+from bench.link.joining import Joiner, Sample
 from bench.rigfile import RigFile
 from bench.rigfile.messages import Message
 
 Values = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
-KEPT = 8  # samples that may wait for a late message
 
 
 @dataclass(frozen=True)
@@ -81,23 +75,13 @@ class _Part:
 
 
 @dataclass
-class _Sample:
-    """What has come of one sample: raw counters and host time of its SYNC, SI values by part."""
-
-    values: list[Values | None]
-    sequence: int = 0
-    tick: int = 0
-    arrived: int = 0
-
-
-@dataclass
 class _Frames:
     """The frames of one part in a batch: what it counts by, ticks (SYNC only), SI values (n, channels), host times."""
 
-    count: list[int]
-    tick: list[int]
+    count: Integers
+    tick: Integers
     values: Values
-    arrived: list[int]
+    arrived: Integers
 
 
 class Assembler:
@@ -141,102 +125,91 @@ class Assembler:
             self.wrong_length += wrong
             kind[(batch["id"] == part.message.identifier) & (batch["length"] == part.message.length)] = k
             frames.append(self._frames(part, mine))
-        done: list[_Sample] = []
+        kinds = kind[kind >= 0]
         place = [0] * len(frames)
-        for k in kind[kind >= 0].tolist():
+        low = int(np.argmax(kinds == 0)) + 1 if (kinds == 0).any() else len(kinds)
+        done = self._joined(kinds[:low], frames, place)
+        cycles = self._regular(kinds[low:], frames, place) if self._joiner.fresh else 0
+        between = self._at_once(frames, place, cycles)
+        after = self._joined(kinds[low + cycles * len(frames) :], frames, place)
+        return _chained(self._rows(done), between, self._rows(after))
+
+    def _regular(self, kinds: Integers, frames: list[_Frames], place: list[int]) -> int:
+        """How many samples follow a SYNC each whole and in one order, with its count, before the SYNC of the next number. These
+        are most of any stream, and need no look at single messages."""
+        parts = len(frames)
+        rows = kinds[: len(kinds) // parts * parts].reshape(-1, parts)
+        if not len(rows) or rows[0, -1] != 0 or len(set(rows[0].tolist())) != parts or min(self._joiner.count_bits) < 2:
+            return 0
+        count = len(rows)
+        first = place[0] - 1
+        numbers = frames[0].count[first : first + count + 1]
+        fine = (rows == rows[0]).all(axis=1)
+        fine[len(numbers) - 1 :] = False
+        for k, bits in enumerate(self._joiner.count_bits, 1):
+            theirs = frames[k].count[place[k] : place[k] + count]
+            n = min(len(theirs), len(numbers) - 1)
+            fine[:n] &= (theirs[:n] - numbers[:n]) % (1 << bits) == 0
+            fine[n:] = False
+        n = len(numbers) - 1
+        fine[:n] &= np.diff(numbers) % (1 << self.sequence_bits) == 1
+        return count if fine.all() else int(np.argmin(fine))
+
+    def _joined(self, kinds: Integers, frames: list[_Frames], place: list[int]) -> list[Sample]:
+        """The samples that messages of these kinds complete, one message after the other; `place` goes on with them."""
+        done: list[Sample] = []
+        for k in kinds.tolist():
             f, j = frames[k], place[k]
             place[k] += 1
             if k == 0:
-                done += self._joiner.sync(f.count[j], f.tick[j], f.arrived[j], f.values[j])
+                done += self._joiner.sync(int(f.count[j]), int(f.tick[j]), f.arrived[j], f.values[j])
             else:
-                self._joiner.data(k, f.count[j], f.values[j])
-        return self._rows(done)
+                self._joiner.data(k, int(f.count[j]), f.values[j])
+        return done
+
+    def _at_once(self, frames: list[_Frames], place: list[int], cycles: int) -> Rows:
+        """So many samples of `_regular`, from the newest SYNC on."""
+        if not cycles:
+            return self._rows([])
+        sync, first = frames[0], place[0] - 1
+        last = first + cycles
+        starts = [first, *place[1:]]
+        table = np.concatenate([f.values[at : at + cycles] for f, at in zip(frames, starts, strict=True)], axis=1)
+        place[:] = [at + cycles for at in place]
+        newest = Sample(
+            [sync.values[last]] + [None] * (len(frames) - 1),
+            int(sync.count[last]), int(sync.tick[last]), int(sync.arrived[last]),
+        )  # fmt: skip
+        self._joiner.go_on(cycles, newest)
+        return self._table(table, sync.count[first:last], sync.tick[first:last], sync.arrived[first:last])
 
     def _frames(self, part: _Part, mine: FrameBatch) -> _Frames:
         b, first = self._binding, part is self._parts[0]
         table = part.decoder.table(mine["data"])
-        counts = part.integers(table, b.sequence if first else b.counter).tolist()
-        ticks = part.integers(table, b.tick).tolist() if first else []
-        return _Frames(counts, ticks, np.ascontiguousarray(part.si(table).T), mine["t_ns"].tolist())
+        counts = part.integers(table, b.sequence if first else b.counter)
+        ticks = part.integers(table, b.tick) if first else np.empty(0, np.int64)
+        return _Frames(counts, ticks, np.ascontiguousarray(part.si(table).T), mine["t_ns"])
 
-    def _rows(self, done: list[_Sample]) -> Rows:
-        names = [n for p in self._parts for n in p.channels]
-        table = np.array([np.concatenate([v for v in s.values if v is not None]) for s in done])
-        table = table.reshape(len(done), len(names))
+    def _rows(self, done: list[Sample]) -> Rows:
+        width = sum(len(p.channels) for p in self._parts)
+        table = np.array([np.concatenate([v for v in s.values if v is not None]) for s in done]).reshape(
+            len(done), width
+        )
         counters = np.array([(s.sequence, s.tick, s.arrived) for s in done], np.int64).reshape(len(done), 3)
-        columns = dict(zip(names, np.ascontiguousarray(table.T), strict=True))
-        return Rows(counters[:, 0], counters[:, 1], counters[:, 2], columns)
+        return self._table(table, *counters.T)
+
+    def _table(self, table: Values, sequence: Integers, tick: Integers, arrived: Integers) -> Rows:
+        names = [n for p in self._parts for n in p.channels]
+        return Rows(sequence, tick, arrived, dict(zip(names, np.ascontiguousarray(table.T), strict=True)))
 
 
-@dataclass
-class Joiner:
-    """Joins the messages of a sample. Inside, sequence numbers do not wrap.
-
-    Args:
-        sequence_bits: of the number in SYNC.
-        count_bits: of the counts in the other messages.
-    """
-
-    sequence_bits: int
-    count_bits: Sequence[int]
-    misplaced: int = 0
-    _newest: int | None = None
-    _pending: list[tuple[int, int, Values]] = field(default_factory=list)  # part, count, values since the newest SYNC
-    _waiting: dict[int, _Sample] = field(default_factory=dict)
-
-    def data(self, part: int, count: int, values: Values) -> None:
-        """One message that is not SYNC; `part` counts from 1."""
-        if self._newest is not None and len(self._pending) < 1 << 12:  # without SYNC nothing can be told
-            self._pending.append((part, count, values))
-
-    def sync(self, sequence: int, tick: int, arrived: int, values: Values) -> list[_Sample]:
-        """One SYNC: settles where the messages since the one before belong; the samples that are complete by now."""
-        half, size = 1 << (self.sequence_bits - 1), 1 << self.sequence_bits
-        if self._newest is None:
-            self._newest = sequence
-        ahead = (sequence - self._newest + half) % size - half
-        number = self._newest + ahead
-        if ahead > 0:
-            self._settle(ahead)
-            self._newest = number
-        elif ahead < -KEPT:  # the controller has started anew
-            self._pending.clear()
-            self._waiting.clear()
-            self._newest = number
-        sample = self._waiting.setdefault(number, _Sample([None] * (len(self.count_bits) + 1)))
-        if sample.values[0] is not None and sample.tick != tick:  # started anew while its numbers were still small
-            self._pending.clear()
-            self._waiting.clear()
-            sample = self._waiting[number] = _Sample([None] * (len(self.count_bits) + 1))
-        sample.values[0], sample.sequence, sample.tick, sample.arrived = values, sequence, tick, arrived
-        return self._complete()
-
-    def _settle(self, ahead: int) -> None:
-        """Give what waited its sequence numbers: up to that of the SYNC that came now, down to a few before."""
-        assert self._newest is not None
-        due = self._newest + ahead
-        for part, count, values in self._pending:
-            size = 1 << self.count_bits[part - 1]
-            slack = (size - 1 - ahead) // 2  # samples that a message may be late; as many are left between
-            if slack < max(1, size // 8):
-                self.misplaced += 1  # too much is missing to tell which sample this belongs to
-                continue
-            low = self._newest - slack
-            number = low + (count - low) % size
-            if not due - KEPT <= number <= due:
-                self.misplaced += 1
-                continue
-            sample = self._waiting.setdefault(number, _Sample([None] * (len(self.count_bits) + 1)))
-            sample.values[part] = values
-        self._pending.clear()
-
-    def _complete(self) -> list[_Sample]:
-        assert self._newest is not None
-        done = [n for n, s in self._waiting.items() if all(v is not None for v in s.values)]
-        out = [self._waiting.pop(n) for n in sorted(done)]
-        for number in [n for n in self._waiting if abs(self._newest - n) > KEPT]:
-            del self._waiting[number]
-        return out
+def _chained(*blocks: Rows) -> Rows:
+    """Rows one after the other, as one."""
+    some = [b for b in blocks if len(b)]
+    if len(some) < 2:
+        return some[0] if some else blocks[0]
+    sequence, tick, arrived = (np.concatenate([getattr(b, x) for b in some]) for x in ("sequence", "tick", "arrived"))
+    return Rows(sequence, tick, arrived, {n: np.concatenate([b.columns[n] for b in some]) for n in some[0].columns})
 
 
 def _part(rig: RigFile, message: Message) -> _Part:

@@ -6,6 +6,7 @@ Both ends are state machines without time and without input or output: the calle
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from dataclasses import dataclass
 from typing import Final, Literal
 
@@ -64,8 +65,9 @@ def flow_control(block_size: int = 0, st_min: int = 0, status: int = _CONTINUE) 
 
 
 def _padded(content: bytes) -> bytes:
-    length = next(n for n in LENGTHS if n >= len(content))
-    return content + bytes([PADDING]) * (length - len(content)) if len(content) > 8 else content
+    if len(content) <= 8:
+        return content
+    return content + bytes([PADDING]) * (LENGTHS[bisect_left(LENGTHS, len(content))] - len(content))
 
 
 class Sender:
