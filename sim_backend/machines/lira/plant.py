@@ -1,0 +1,129 @@
+"""The linear-rotary actuator's core behind a typed facade: `run` is the only way time passes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from sim_backend.core.plant import Array, fill, open_core
+from sim_backend.machines.lira.params import ControlParams, PlantParams
+
+TICKS_S: Final = 280_000
+POSITION_TICKS: Final = 8
+AXES: Final = ("x1", "x2", "y1", "y2", "z", "angle")
+SYSTEMS: Final = ("R1", "B1", "R2", "B2", "L")
+DQ: Final = tuple(f"{way}_{name}" for name in SYSTEMS for way in "dq")
+TRACE: Final = (
+    *AXES, *(f"true_{n}" for n in AXES), *(f"i_{n}" for n in DQ), *(f"u_{n}" for n in DQ), *(f"f_{n}" for n in DQ),
+    *(f"wanted_{n}" for n in DQ), *(f"force_{n}" for n in AXES), *(f"rate_{n}" for n in AXES), "contact", "limited", "injected",
+)  # fmt: skip
+"""Of one tick: readings, true places of the sensors' targets; as the firmware has them dq coil currents, capacitor voltages,
+inductor currents and references, the forces it wants, the rates it sees; what rings bear, limited loops, what is injected."""
+
+_ffi, _lib = open_core(Path(__file__).with_name("lira.h"))
+
+
+class Plant:
+    """The machine with its firmware's loops.
+
+    Args:
+        params: the plant.
+        seed: of all noise.
+        control: the firmware's parameters.
+        reduced: currents follow by a lag of second order and all goes at 35 kHz: for what current loops, wiring and electrical
+            captures do not matter to.
+    """
+
+    def __init__(self, params: PlantParams | None = None, seed: int = 0, *, control: ControlParams | None = None,
+                 reduced: bool = False) -> None:  # fmt: skip
+        self.params = params or PlantParams()
+        self._p: Any = _ffi.new("lira_params *")
+        self._c: Any = _ffi.new("lira_control *")
+        self._s: Any = _ffi.new("lira_state *")
+        fill(self._p, vars(self.params))
+        fill(self._c, vars(control or ControlParams()))
+        _lib.lira_start(self._p, self._s, seed & (2**64 - 1))
+        self._advance = _lib.lira_run_reduced if reduced else _lib.lira_run
+
+    @property
+    def tick(self) -> int:
+        """Ticks of 1/280 000 s since the start."""
+        return int(self._s.tick)
+
+    def set(self, name: str, value: float) -> None:
+        """Set a parameter of the firmware by its name, SI.
+
+        Raises:
+            AttributeError: there is no such parameter.
+        """
+        setattr(self._c, name, value)
+
+    def switch(self, *, currents: bool | None = None, bearings: bool | None = None, axial: bool | None = None,
+               angle: bool | None = None) -> None:  # fmt: skip
+        """Switch the current loops, the radial loops, that of z and that of the angle."""
+        for name, on in (("currents", currents), ("bearings", bearings), ("axial", axial), ("angle", angle)):
+            if on is not None:
+                setattr(self._s, f"{name}_on", int(on))
+
+    def refer(self, axis: str, value: float, rate: float = 0.0) -> None:
+        """Set point of a loop, m or rad, and its rate."""
+        k = AXES.index(axis)
+        self._s.ref[k], self._s.ref_rate[k] = value, rate
+
+    def step(self, name: str, amperes: float) -> None:
+        """What is added to a dq reference, such as `d_R1`."""
+        self._s.manual[DQ.index(name)] = amperes
+
+    def put(self, **places: float) -> None:
+        """Put the mover somewhere, for tests: x, y, alpha, beta, z, angle in m and rad, with rates `x_rate` and so on."""
+        names = ("x", "y", "alpha", "beta", "z", "angle")
+        for name, value in places.items():
+            into = self._s.v if name.endswith("_rate") else self._s.q
+            into[names.index(name.removesuffix("_rate"))] = value
+
+    def push(self, newtons: Array) -> None:
+        """Outer forces from now on: N at the planes (x1, x2, y1, y2), N along z, N m."""
+        self._p.push[0:6] = [float(x) for x in newtons]
+
+    @property
+    def place(self) -> Array:
+        """True x, y, alpha, beta, z, angle and their rates, (12,)."""
+        return np.array([*self._s.q, *self._s.v])
+
+    @property
+    def electric(self) -> Array:
+        """True inductor currents, capacitor and damper voltages, coil currents of the half-bridges, (4, 15)."""
+        s = self._s
+        return np.array([list(s.bridge), list(s.u), list(s.damper), list(s.coil)])
+
+    @property
+    def sent(self) -> Array:
+        """What the half-bridges give now, V from the middle of the DC link, (15,)."""
+        return np.array(list(self._s.sent))
+
+    def run(self, seconds: float, every: int = POSITION_TICKS) -> Array:
+        """Advance; of every so many ticks a row.
+
+        Returns:
+            (n, len(TRACE)).
+        """
+        ticks = round(seconds * TICKS_S)
+        rows = np.empty((ticks // every + 2 if every else 0, len(TRACE)))
+        count = self._advance(self._p, self._c, self._s, ticks, _ffi.cast("double *", rows.ctypes.data), every)
+        return rows[:count]
+
+
+def ideal(params: PlantParams | None = None) -> PlantParams:
+    """The plant with sensors that tell what is: no noise, rounding, lag or ripple."""
+    p = params or PlantParams()
+    return replace(p, **p.ideal())  # type: ignore[arg-type]
+
+
+def coils(dq: Array, phase: float) -> Array:
+    """Currents of six coils (6,) of (d, q) of R and of B, L (1) as corrected, for tests."""
+    out, given = _ffi.new("double[6]"), _ffi.new("double[4]", [float(x) for x in dq])
+    _lib.lira_coils(given, np.cos(phase), np.sin(phase), out)
+    return np.array(list(out))
