@@ -39,7 +39,8 @@ typedef struct {
         model_cogging_torque, model_pitch, gravity;
     double psi_rot, psi_lin, zero_ra1, zero_ra2, zero_la; /* Wb, rad electrical */
     double model_l_rot, model_l_lin, model_l_f, model_c;
-    double inject_axis, inject_place, inject_amplitude, inject_hz; /* 0 sensor, 1 reference and its rate, 2 force */
+    double inject_axis, inject_place, inject_amplitude, inject_hz;
+    double z_lift, v_lift, v_land, z_off, gate_m, gate_s, refuse_m, lost_m, lost_s, trip_A, supply_V, watchdog_s, rest_s; /* after the way down */
 } lira_control;
 
 typedef struct {
@@ -56,11 +57,15 @@ typedef struct {
     double star[5][216];                     /* exact step: columns of twelve for twelve states, three u_sw, three emfs */
     int32_t member[5][3];                    /* half-bridges of each star */
     int32_t currents_on, bearings_on, angle_on, axial_on, fresh, limited, frozen;
+    double target[6], speed[6], rise[6]; /* where set points go, m or rad, and how fast at most */
+    int32_t mode, fault, gate_clock, lost_clock;
+    int64_t heard; /* tick of the last heartbeat; -1: none is waited for */
     core_noise noise;
     int64_t tick;
 } lira_state;
 
 void lira_start(const lira_params *, lira_state *, uint64_t seed);
+int32_t lira_command(const lira_params *, const lira_control *, lira_state *, int32_t command);
 int64_t lira_run(const lira_params *, const lira_control *, lira_state *, int64_t ticks, double *trace, int64_t every);
 int64_t lira_run_reduced(const lira_params *, const lira_control *, lira_state *, int64_t ticks, double *trace, int64_t every);
 void lira_coils(const double *dq, double cos_phase, double sin_phase, double *coils);
@@ -71,7 +76,11 @@ void lira_coils(const double *dq, double cos_phase, double sin_phase, double *co
 #define BRIDGES 15
 #define SYSTEMS 5
 #define POLE_PAIRS 8
-#define LIRA_TRACE 67
+#define LIRA_TRACE 69
+#define STEP_S (LIRA_TICK * POSITION_TICKS)
+enum { LIRA_OFF, LIRA_IDLE, LIRA_CURRENT, LIRA_LIFT, LIRA_LEVITATED, LIRA_LANDING, LIRA_FAULT };
+enum { DO_IDLE, DO_ON, DO_LIFT, DO_LAND, DO_STOP, DO_CLEAR };
+enum { FAULT_NONE, FAULT_LOST, FAULT_CURRENT, FAULT_SUPPLY };
 enum { X1, X2, Y1, Y2, Z, ANGLE };
 
 typedef struct {
@@ -92,5 +101,6 @@ void lira_accelerate(const lira_params *, lira_state *, const lira_place *, cons
 void lira_sight(const lira_params *, lira_state *, double step_s, double keep);
 double lira_kept(const lira_params *, double step_s);
 void lira_positions(const lira_params *, const lira_control *, lira_state *);
+void lira_supervise(const lira_params *, const lira_control *, lira_state *);
 void lira_currents(const lira_params *, const lira_control *, lira_state *);
 #endif

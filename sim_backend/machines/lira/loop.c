@@ -19,6 +19,8 @@ void lira_start(const lira_params *p, lira_state *st, uint64_t seed) {
     for (int a = 0; a < 2; a++) st->cos_ra[a] = 1;
     st->cos_la = 1;
     st->fresh = 1;
+    st->mode = LIRA_OFF;
+    st->heard = -1;
     lira_stars(p, st);
 }
 
@@ -60,6 +62,8 @@ static void tell(const lira_params *p, const lira_state *st, double *out) {
     out[64] = st->contact;
     out[65] = st->limited;
     out[66] = st->injected;
+    out[67] = st->mode;
+    out[68] = st->fault;
 }
 
 /* forces where the mover is, once for the kick that ends a tick and the one that begins the next */

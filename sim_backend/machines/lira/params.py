@@ -125,7 +125,7 @@ class ControlParams:
     observer: float = 1.0
     observer_pull: float = 1.0
     limit_after_ff: float = 0.0
-    frozen_below: float = 2.8e-3
+    frozen_below: float = -1.0  # m; never: integrators that rest in the rings leave a mover with uneven magnets on them
     kp_s: float = 40.0
     ki_s: float = 20e3
     kp_sl: float = 516.7  # the linear winding's, scaled by its inductance: at 40 V/A its loop has 205 Hz
@@ -157,3 +157,16 @@ class ControlParams:
     inject_place: float = 1.0
     inject_amplitude: float = 0.0
     inject_hz: float = 100.0
+    z_lift: float = 8e-3  # stand-in: where it is lifted to, out of the rings
+    v_lift: float = 0.02
+    v_land: float = 0.01  # L VI-B, as the next four
+    z_off: float = 2.7e-3
+    gate_m: float = 20e-6
+    gate_s: float = 0.25
+    refuse_m: float = 60e-6  # stand-in: at rest in the rings it reads 30 to 36 um, the bearings catch from 60
+    lost_m: float = 100e-6
+    lost_s: float = 1e-3
+    trip_A: float = 12.0
+    supply_V: float = 400.0
+    watchdog_s: float = 0.08
+    rest_s: float = 0.2  # stand-in: at z = 0 before the PWM goes off

@@ -15,10 +15,14 @@ TICKS_S: Final = 280_000
 POSITION_TICKS: Final = 8
 AXES: Final = ("x1", "x2", "y1", "y2", "z", "angle")
 SYSTEMS: Final = ("R1", "B1", "R2", "B2", "L")
+STATES: Final = ("OFF", "IDLE", "CURRENT", "LIFT", "LEVITATED", "LANDING", "FAULT")
+COMMANDS: Final = ("idle", "on", "lift", "land", "stop", "clear")
+FAULTS: Final = ("NONE", "LEVITATION_LOST", "OVERCURRENT", "SUPPLY")
 DQ: Final = tuple(f"{way}_{name}" for name in SYSTEMS for way in "dq")
 TRACE: Final = (
     *AXES, *(f"true_{n}" for n in AXES), *(f"i_{n}" for n in DQ), *(f"u_{n}" for n in DQ), *(f"f_{n}" for n in DQ),
     *(f"wanted_{n}" for n in DQ), *(f"force_{n}" for n in AXES), *(f"rate_{n}" for n in AXES), "contact", "limited", "injected",
+    "mode", "fault",
 )  # fmt: skip
 """Of one tick: readings, true places of the sensors' targets; as the firmware has them dq coil currents, capacitor voltages,
 inductor currents and references, the forces it wants, the rates it sees; what rings bear, limited loops, what is injected."""
@@ -68,10 +72,38 @@ class Plant:
             if on is not None:
                 setattr(self._s, f"{name}_on", int(on))
 
+    def command(self, name: str) -> int:
+        """Give the firmware a command: 0 done, 1 not in this state, 2 the mover stands too far off the middle to be lifted."""
+        return int(_lib.lira_command(self._p, self._c, self._s, COMMANDS.index(name)))
+
+    def beat(self) -> None:
+        """A heartbeat of the host."""
+        self._s.heard = self._s.tick
+
+    @property
+    def state(self) -> str:
+        """Of the firmware."""
+        return STATES[self._s.mode]
+
+    @property
+    def fault(self) -> str:
+        """What tripped."""
+        return FAULTS[self._s.fault]
+
+    def go(self, axis: str, target: float, speed: float = 0.0, rise: float = 0.0) -> None:
+        """Send a set point to a target with a speed and an acceleration at most; without the latter by a step."""
+        k = AXES.index(axis)
+        self._s.target[k], self._s.speed[k], self._s.rise[k] = target, speed, rise
+
     def refer(self, axis: str, value: float, rate: float = 0.0) -> None:
-        """Set point of a loop, m or rad, and its rate."""
+        """Set point of a loop, m or rad, and its rate, at once; for tests of loops without the firmware's states."""
         k = AXES.index(axis)
         self._s.ref[k], self._s.ref_rate[k] = value, rate
+
+    def set_point(self, axis: str) -> tuple[float, float]:
+        """Where a set point is on its way, and its rate."""
+        k = AXES.index(axis)
+        return float(self._s.ref[k]), float(self._s.ref_rate[k])
 
     def step(self, name: str, amperes: float) -> None:
         """What is added to a dq reference, such as `d_R1`."""

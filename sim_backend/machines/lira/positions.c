@@ -6,8 +6,6 @@
 #include <math.h>
 #include "winding.h"
 
-#define STEP_S (LIRA_TICK * POSITION_TICKS)
-
 /* what a step of so many s leaves of the radial sensors' lag of first order */
 double lira_kept(const lira_params *p, double step_s) { return p->filter_lag > 0 ? exp(-step_s / p->filter_lag) : 0; }
 
@@ -107,12 +105,13 @@ static void turn(const lira_control *c, lira_state *st) {
 }
 
 void lira_positions(const lira_params *p, const lira_control *c, lira_state *st) {
-    int on[6] = {st->bearings_on, st->bearings_on, st->bearings_on, st->bearings_on, st->axial_on, st->angle_on};
     double rate, tone = injected(c, st, &rate);
     read(p, st);
     if (st->fresh)
         for (int j = 0; j < 6; j++) st->was[j] = st->seen[j] = st->read[j];
     st->fresh = st->limited = 0;
+    lira_supervise(p, c, st);
+    int on[6] = {st->bearings_on, st->bearings_on, st->bearings_on, st->bearings_on, st->axial_on, st->angle_on};
     for (int j = 0; j < 6; j++) {
         double extra = (int)c->inject_axis == j && (int)c->inject_place == 2 && on[j] ? tone : 0;
         st->force[j] = loop(c, st, j, on[j], tone, rate) + extra;

@@ -1,0 +1,128 @@
+/* States of the firmware, at every reading of the positions: OFF, IDLE (no PWM), CURRENT (current loops, angle and z; in the
+ * touchdown rings), LIFT (bearings on, out of the rings, gate running), LEVITATED, LANDING (down, bearings off in the rings, on to
+ * z = 0), FAULT. L's VI-B: the gate wants all four radial readings within +-20 um for 250 ms; landing at 10 mm/s, off at 2.7 mm. */
+#include <math.h>
+#include <string.h>
+#include "winding.h"
+
+static void off(lira_state *st, int mode) {
+    st->currents_on = st->bearings_on = st->angle_on = st->axial_on = 0;
+    memset(st->stator, 0, sizeof st->stator);
+    memset(st->capacitor, 0, sizeof st->capacitor);
+    memset(st->ref_rate, 0, sizeof st->ref_rate);
+    st->heard = -1;
+    st->mode = mode;
+}
+
+static void trip(lira_state *st, int fault) {
+    off(st, LIRA_FAULT);
+    st->fault = fault;
+}
+
+/* from where an axis stands to a target, as fast as may be */
+static void aim(lira_state *st, int j, double target, double speed, double rise) {
+    st->target[j] = target;
+    st->speed[j] = speed;
+    st->rise[j] = rise;
+}
+
+/* currents, angle and z on, held where they are */
+static void take_hold(lira_state *st) {
+    for (int j = 0; j < 6; j++) {
+        st->ref[j] = j < Z ? 0 : st->read[j];
+        st->ref_rate[j] = 0;
+        aim(st, j, st->ref[j], j == Z ? 0.5 : 18, j == Z ? 40 : 300);
+    }
+    st->currents_on = st->angle_on = st->axial_on = 1;
+    st->heard = st->tick;
+    st->mode = LIRA_CURRENT;
+}
+
+static double farthest(const lira_state *st) {
+    double out = 0;
+    for (int k = 0; k < 4; k++) out = most(out, fabs(st->read[k]));
+    return out;
+}
+
+static void lift(const lira_control *c, lira_state *st) {
+    st->bearings_on = 1;
+    st->gate_clock = 0;
+    st->mode = LIRA_LIFT;
+    aim(st, Z, c->z_lift, c->v_lift, 1);
+}
+
+static void land(const lira_control *c, lira_state *st) {
+    st->gate_clock = 0;
+    st->mode = LIRA_LANDING;
+    aim(st, Z, 0, c->v_land, 1);
+}
+
+/* 0: done; 1: not in this state; 2: it stands too far from the middle to be lifted */
+int32_t lira_command(const lira_params *p, const lira_control *c, lira_state *st, int32_t command) {
+    (void)p;
+    int still = st->mode == LIRA_OFF || st->mode == LIRA_IDLE;
+    switch (command) {
+    case DO_IDLE: return still ? (off(st, LIRA_IDLE), 0) : 1;
+    case DO_ON: return st->mode == LIRA_IDLE ? (take_hold(st), 0) : 1;
+    case DO_LIFT:
+        if (st->mode != LIRA_CURRENT) return 1;
+        return farthest(st) > c->refuse_m ? 2 : (lift(c, st), 0);
+    case DO_LAND: return st->mode == LIRA_LIFT || st->mode == LIRA_LEVITATED ? (land(c, st), 0) : 1;
+    case DO_STOP: return st->mode == LIRA_FAULT ? 1 : (off(st, LIRA_IDLE), 0);
+    case DO_CLEAR:
+        if (st->mode != LIRA_FAULT) return 1;
+        off(st, LIRA_IDLE);
+        st->fault = FAULT_NONE;
+        return 0;
+    default: return 1;
+    }
+}
+
+/* A set point on its way: at the next sample as fast as the speed, the rise and the way left to brake in allow. To brake from the
+ * next speed v takes v^2/(2 a), after a sample's way at the mean of this speed and the next. */
+static void follow(lira_state *st, int j) {
+    double left = st->target[j] - st->ref[j], a = st->rise[j], step = STEP_S, v = st->ref_rate[j], sense = left < 0 ? -1 : 1;
+    if (a <= 0) { /* none: a step */
+        st->ref[j] = st->target[j];
+        st->ref_rate[j] = 0;
+        return;
+    }
+    double room = most(fabs(left) - 0.5 * step * v * sense, 0), brake = 0.5 * a * step * (sqrt(1 + 8 * room / (a * step * step)) - 1);
+    double wanted = sense * least(brake, st->speed[j]), next = clip(wanted, v - a * step, v + a * step);
+    double moved = st->ref[j] + 0.5 * step * (v + next);
+    int arrives = fabs(left) <= a * step * step && fabs(next) <= 2 * a * step;
+    st->ref[j] = arrives ? st->target[j] : moved;
+    st->ref_rate[j] = arrives ? 0 : next;
+}
+
+static void gate(const lira_control *c, lira_state *st) {
+    int inside = st->ref[Z] == st->target[Z] && farthest(st) <= c->gate_m;
+    st->gate_clock = inside ? st->gate_clock + 1 : 0;
+    if (st->gate_clock * STEP_S >= c->gate_s) st->mode = LIRA_LEVITATED;
+}
+
+static void set_down(const lira_control *c, lira_state *st) {
+    if (st->bearings_on && st->read[Z] <= c->z_off) st->bearings_on = 0;
+    st->gate_clock = !st->bearings_on && st->ref[Z] == st->target[Z] ? st->gate_clock + 1 : 0;
+    if (st->gate_clock * STEP_S >= c->rest_s) off(st, LIRA_IDLE);
+}
+
+static void watch(const lira_params *p, const lira_control *c, lira_state *st) {
+    int lost = st->bearings_on && st->read[Z] > p->edge_out && farthest(st) > c->lost_m;
+    st->lost_clock = lost ? st->lost_clock + 1 : 0;
+    if (st->lost_clock * STEP_S >= c->lost_s) trip(st, FAULT_LOST);
+    if (fabs(p->supply - c->supply_V) > 0.1 * c->supply_V) trip(st, FAULT_SUPPLY);
+    for (int k = 0; k < BRIDGES; k++)
+        if (fabs(st->coil[k]) > c->trip_A) trip(st, FAULT_CURRENT);
+    int silent = st->heard >= 0 && (st->tick - st->heard) * LIRA_TICK > c->watchdog_s;
+    if (silent && (st->mode == LIRA_LIFT || st->mode == LIRA_LEVITATED)) land(c, st);
+    if (silent && st->mode == LIRA_CURRENT) off(st, LIRA_IDLE);
+}
+
+void lira_supervise(const lira_params *p, const lira_control *c, lira_state *st) {
+    if (st->mode < LIRA_CURRENT || st->mode == LIRA_FAULT) return;
+    for (int j = 0; j < 6; j++) follow(st, j);
+    if (st->mode == LIRA_LIFT) gate(c, st);
+    if (st->mode == LIRA_LANDING) set_down(c, st);
+    watch(p, c, st);
+}
