@@ -6,7 +6,7 @@
 
 /* Readings of the half-bridges, by terminal: inductor currents are late by `late` s on a slope of duty U_DC/L_f, which is another
  * error in each of them; voltages have the carrier's ripple, alike in all and alternating from edge to edge. */
-static void read(const lira_params *p, lira_state *st, double *bridge, double *u, double *coil) {
+static void read(const lira_params *p, lira_state *st) {
     double normal[3 * BRIDGES], slope = p->late, edge = st->tick & 1 ? -p->ripple : p->ripple;
     double per_i = p->bridge_lsb > 0 ? 1 / p->bridge_lsb : 0, per_u = p->voltage_lsb > 0 ? 1 / p->voltage_lsb : 0,
            per_c = p->coil_lsb > 0 ? 1 / p->coil_lsb : 0;
@@ -17,9 +17,9 @@ static void read(const lira_params *p, lira_state *st, double *bridge, double *u
         double i = p->bridge_gain[k] * (st->bridge[k] - late) + p->bridge_offset[k] + p->bridge_noise * normal[k];
         double v = p->voltage_gain[k] * (st->u[k] + edge) + p->voltage_noise * normal[BRIDGES + k];
         double s = p->coil_gain[k] * st->coil[k] + p->coil_offset[k] + p->coil_noise * normal[2 * BRIDGES + k];
-        bridge[k] = quantise(i, p->bridge_lsb, per_i);
-        u[k] = quantise(v, p->voltage_lsb, per_u);
-        coil[k] = quantise(s, p->coil_lsb, per_c);
+        st->bridge_read[k] = quantise(i, p->bridge_lsb, per_i);
+        st->u_read[k] = quantise(v, p->voltage_lsb, per_u);
+        st->coil_read[k] = quantise(s, p->coil_lsb, per_c);
     }
 }
 
@@ -54,12 +54,12 @@ static INLINE double cascade(const lira_control *c, lira_state *st, const windin
 }
 
 void lira_currents(const lira_params *p, const lira_control *c, lira_state *st) {
-    double bridge[BRIDGES], u[BRIDGES], coil[BRIDGES], send[10], half = p->supply / 2;
+    double send[10], half = p->supply / 2;
     lira_turn ra[2] = {{st->cos_ra[0], st->sin_ra[0]}, {st->cos_ra[1], st->sin_ra[1]}}, la = {st->cos_la, st->sin_la};
-    read(p, st, bridge, u, coil);
-    split_all(bridge, ra, la, st->bridge_dq);
-    split_all(u, ra, la, st->u_dq);
-    split_all(coil, ra, la, st->coil_dq);
+    read(p, st);
+    split_all(st->bridge_read, ra, la, st->bridge_dq);
+    split_all(st->u_read, ra, la, st->u_dq);
+    split_all(st->coil_read, ra, la, st->coil_dq);
     for (int k = 0; k < SYSTEMS; k++) {
         winding w = of_system(c, st, k);
         send[2 * k] = cascade(c, st, &w, 2 * k, half);

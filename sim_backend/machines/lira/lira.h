@@ -46,6 +46,7 @@ typedef struct {
 typedef struct {
     double q[6], v[6], a[6];                  /* x y alpha beta z angle */
     double bridge[15], u[15], damper[15], coil[15]; /* i_f, u_s, u_d, i_s */
+    double bridge_read[15], u_read[15], coil_read[15]; /* as the firmware has them */
     double sent[15], next[15];                /* u_sw now and from the next tick on */
     double stator[10], capacitor[10];         /* integrators; systems R1 B1 R2 B2 L, d and q */
     double wanted[10], manual[10];            /* dq references, and what is added to them */
@@ -76,7 +77,7 @@ void lira_coils(const double *dq, double cos_phase, double sin_phase, double *co
 #define BRIDGES 15
 #define SYSTEMS 5
 #define POLE_PAIRS 8
-#define LIRA_TRACE 69
+#define LIRA_TRACE 115
 #define STEP_S (LIRA_TICK * POSITION_TICKS)
 enum { LIRA_OFF, LIRA_IDLE, LIRA_CURRENT, LIRA_LIFT, LIRA_LEVITATED, LIRA_LANDING, LIRA_FAULT };
 enum { DO_IDLE, DO_ON, DO_LIFT, DO_LAND, DO_STOP, DO_CLEAR };

@@ -64,6 +64,10 @@ static void tell(const lira_params *p, const lira_state *st, double *out) {
     out[66] = st->injected;
     out[67] = st->mode;
     out[68] = st->fault;
+    memcpy(out + 69, st->bridge_read, sizeof st->bridge_read);
+    memcpy(out + 84, st->u_read, sizeof st->u_read);
+    memcpy(out + 99, st->coil_read, sizeof st->coil_read);
+    out[114] = p->supply;
 }
 
 /* forces where the mover is, once for the kick that ends a tick and the one that begins the next */
@@ -127,6 +131,14 @@ static INLINE void push_reduced(const lira_params *p, lira_state *st, const lira
     lira_accelerate(p, st, at, dq);
 }
 
+/* what the reduced machine has of the electrical readings: no half-bridges */
+static void show(lira_state *st) {
+    lira_turn ra[2] = {{st->cos_ra[0], st->sin_ra[0]}, {st->cos_ra[1], st->sin_ra[1]}}, la = {st->cos_la, st->sin_la};
+    memcpy(st->coil_dq, st->lag, sizeof st->coil_dq);
+    join_all(st->lag, ra, la, st->coil_read);
+    for (int k = 0; k < BRIDGES; k++) st->bridge_read[k] = st->u_read[k] = NAN;
+}
+
 static void follow(lira_state *st, const double *m) {
     for (int k = 0; k < 10; k++) {
         double u = st->currents_on ? st->wanted[k] : 0, x = st->lag[k] - u, v = st->lag[10 + k];
@@ -144,7 +156,7 @@ int64_t lira_run_reduced(const lira_params *p, const lira_control *c, lira_state
     for (int64_t n = 0; n < ticks; n += POSITION_TICKS) {
         lira_sight(p, st, step, keep);
         lira_positions(p, c, st);
-        memcpy(st->coil_dq, st->lag, sizeof st->coil_dq);
+        show(st);
         if (every && st->tick % every == 0) tell(p, st, trace + LIRA_TRACE * rows++);
         push_reduced(p, st, &at); /* anew: the firmware's frame has jumped with the reading */
         kick(st, step / 2);

@@ -19,13 +19,19 @@ STATES: Final = ("OFF", "IDLE", "CURRENT", "LIFT", "LEVITATED", "LANDING", "FAUL
 COMMANDS: Final = ("idle", "on", "lift", "land", "stop", "clear")
 FAULTS: Final = ("NONE", "LEVITATION_LOST", "OVERCURRENT", "SUPPLY")
 DQ: Final = tuple(f"{way}_{name}" for name in SYSTEMS for way in "dq")
+PHASES: Final = range(1, 16)
+MEASURED: Final = (
+    *(f"i_f{k}" for k in PHASES), *(f"u_s{k}" for k in PHASES), *(f"i_s{k}" for k in PHASES), "u_dc", *AXES,
+)  # fmt: skip
+"""The firmware's 52 measurements: inductor currents, capacitor voltages, coil currents of the half-bridges, supply, places."""
 TRACE: Final = (
     *AXES, *(f"true_{n}" for n in AXES), *(f"i_{n}" for n in DQ), *(f"u_{n}" for n in DQ), *(f"f_{n}" for n in DQ),
     *(f"wanted_{n}" for n in DQ), *(f"force_{n}" for n in AXES), *(f"rate_{n}" for n in AXES), "contact", "limited", "injected",
-    "mode", "fault",
+    "mode", "fault", *MEASURED[:46],
 )  # fmt: skip
 """Of one tick: readings, true places of the sensors' targets; as the firmware has them dq coil currents, capacitor voltages,
-inductor currents and references, the forces it wants, the rates it sees; what rings bear, limited loops, what is injected."""
+inductor currents and references, the forces it wants, the rates it sees; what rings bear, limited loops, what is injected;
+state and fault; the measurements."""
 
 _ffi, _lib = open_core(Path(__file__).with_name("lira.h"))
 
