@@ -67,8 +67,9 @@ typedef struct {
 
 void lira_start(const lira_params *, lira_state *, uint64_t seed);
 int32_t lira_command(const lira_params *, const lira_control *, lira_state *, int32_t command);
-int64_t lira_run(const lira_params *, const lira_control *, lira_state *, int64_t ticks, double *trace, int64_t every);
-int64_t lira_run_reduced(const lira_params *, const lira_control *, lira_state *, int64_t ticks, double *trace, int64_t every);
+int64_t lira_run(const lira_params *, const lira_control *, lira_state *, int64_t ticks, double *trace, int64_t every, int32_t whole);
+int64_t lira_run_reduced(const lira_params *, const lira_control *, lira_state *, int64_t ticks, double *trace, int64_t every,
+                         int32_t whole);
 void lira_coils(const double *dq, double cos_phase, double sin_phase, double *coils);
 /* declarations end */
 
@@ -77,7 +78,8 @@ void lira_coils(const double *dq, double cos_phase, double sin_phase, double *co
 #define BRIDGES 15
 #define SYSTEMS 5
 #define POLE_PAIRS 8
-#define LIRA_TRACE 115
+#define LIRA_TRACE 69
+#define LIRA_WHOLE (LIRA_TRACE + 3 * BRIDGES + 1)
 #define STEP_S (LIRA_TICK * POSITION_TICKS)
 enum { LIRA_OFF, LIRA_IDLE, LIRA_CURRENT, LIRA_LIFT, LIRA_LEVITATED, LIRA_LANDING, LIRA_FAULT };
 enum { DO_IDLE, DO_ON, DO_LIFT, DO_LAND, DO_STOP, DO_CLEAR };

@@ -64,10 +64,17 @@ static void tell(const lira_params *p, const lira_state *st, double *out) {
     out[66] = st->injected;
     out[67] = st->mode;
     out[68] = st->fault;
-    memcpy(out + 69, st->bridge_read, sizeof st->bridge_read);
-    memcpy(out + 84, st->u_read, sizeof st->u_read);
-    memcpy(out + 99, st->coil_read, sizeof st->coil_read);
-    out[114] = p->supply;
+}
+
+/* a row of the trace, with the half-bridges' measurements where they are wanted too; how long it is */
+static INLINE int64_t tell_row(const lira_params *p, const lira_state *st, double *out, int32_t whole) {
+    tell(p, st, out);
+    if (!whole) return LIRA_TRACE;
+    memcpy(out + LIRA_TRACE, st->bridge_read, sizeof st->bridge_read);
+    memcpy(out + LIRA_TRACE + BRIDGES, st->u_read, sizeof st->u_read);
+    memcpy(out + LIRA_TRACE + 2 * BRIDGES, st->coil_read, sizeof st->coil_read);
+    out[LIRA_TRACE + 3 * BRIDGES] = p->supply;
+    return LIRA_WHOLE;
 }
 
 /* forces where the mover is, once for the kick that ends a tick and the one that begins the next */
@@ -78,7 +85,8 @@ static void push(const lira_params *p, lira_state *st, lira_place *at) {
     lira_accelerate(p, st, at, dq);
 }
 
-int64_t lira_run(const lira_params *p, const lira_control *c, lira_state *st, int64_t ticks, double *trace, int64_t every) {
+int64_t lira_run(const lira_params *p, const lira_control *c, lira_state *st, int64_t ticks, double *trace, int64_t every,
+                 int32_t whole) {
     int64_t rows = 0;
     double keep = lira_kept(p, LIRA_TICK);
     lira_place at;
@@ -87,7 +95,10 @@ int64_t lira_run(const lira_params *p, const lira_control *c, lira_state *st, in
         lira_sight(p, st, LIRA_TICK, keep);
         if (st->tick % POSITION_TICKS == 0) lira_positions(p, c, st);
         lira_currents(p, c, st);
-        if (every && st->tick % every == 0) tell(p, st, trace + LIRA_TRACE * rows++);
+        if (every && st->tick % every == 0) {
+            trace += tell_row(p, st, trace, whole);
+            rows++;
+        }
         if (!p->locked) {
             kick(st, LIRA_TICK / 2);
             lira_rates(st, &at);
@@ -134,7 +145,6 @@ static INLINE void push_reduced(const lira_params *p, lira_state *st, const lira
 /* what the reduced machine has of the electrical readings: no half-bridges */
 static void show(lira_state *st) {
     lira_turn ra[2] = {{st->cos_ra[0], st->sin_ra[0]}, {st->cos_ra[1], st->sin_ra[1]}}, la = {st->cos_la, st->sin_la};
-    memcpy(st->coil_dq, st->lag, sizeof st->coil_dq);
     join_all(st->lag, ra, la, st->coil_read);
     for (int k = 0; k < BRIDGES; k++) st->bridge_read[k] = st->u_read[k] = NAN;
 }
@@ -147,7 +157,8 @@ static void follow(lira_state *st, const double *m) {
     }
 }
 
-int64_t lira_run_reduced(const lira_params *p, const lira_control *c, lira_state *st, int64_t ticks, double *trace, int64_t every) {
+int64_t lira_run_reduced(const lira_params *p, const lira_control *c, lira_state *st, int64_t ticks, double *trace, int64_t every,
+                 int32_t whole) {
     int64_t rows = 0;
     double m[4], step = LIRA_TICK * POSITION_TICKS, keep = lira_kept(p, step);
     lira_place at;
@@ -156,8 +167,12 @@ int64_t lira_run_reduced(const lira_params *p, const lira_control *c, lira_state
     for (int64_t n = 0; n < ticks; n += POSITION_TICKS) {
         lira_sight(p, st, step, keep);
         lira_positions(p, c, st);
-        show(st);
-        if (every && st->tick % every == 0) tell(p, st, trace + LIRA_TRACE * rows++);
+        memcpy(st->coil_dq, st->lag, sizeof st->coil_dq);
+        if (whole) show(st);
+        if (every && st->tick % every == 0) {
+            trace += tell_row(p, st, trace, whole);
+            rows++;
+        }
         push_reduced(p, st, &at); /* anew: the firmware's frame has jumped with the reading */
         kick(st, step / 2);
         follow(st, m);

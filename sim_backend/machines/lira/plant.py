@@ -27,11 +27,13 @@ MEASURED: Final = (
 TRACE: Final = (
     *AXES, *(f"true_{n}" for n in AXES), *(f"i_{n}" for n in DQ), *(f"u_{n}" for n in DQ), *(f"f_{n}" for n in DQ),
     *(f"wanted_{n}" for n in DQ), *(f"force_{n}" for n in AXES), *(f"rate_{n}" for n in AXES), "contact", "limited", "injected",
-    "mode", "fault", *MEASURED[:46],
+    "mode", "fault",
 )  # fmt: skip
 """Of one tick: readings, true places of the sensors' targets; as the firmware has them dq coil currents, capacitor voltages,
 inductor currents and references, the forces it wants, the rates it sees; what rings bear, limited loops, what is injected;
-state and fault; the measurements."""
+state and fault."""
+WHOLE: Final = (*TRACE, *MEASURED[:46])
+"""With the half-bridges' measurements and the supply, too."""
 
 _ffi, _lib = open_core(Path(__file__).with_name("lira.h"))
 
@@ -142,15 +144,15 @@ class Plant:
         """What the half-bridges give now, V from the middle of the DC link, (15,)."""
         return np.array(list(self._s.sent))
 
-    def run(self, seconds: float, every: int = POSITION_TICKS) -> Array:
+    def run(self, seconds: float, every: int = POSITION_TICKS, *, whole: bool = False) -> Array:
         """Advance; of every so many ticks a row.
 
         Returns:
-            (n, len(TRACE)).
+            (n, len(TRACE)), or (n, len(WHOLE)).
         """
         ticks = round(seconds * TICKS_S)
-        rows = np.empty((ticks // every + 2 if every else 0, len(TRACE)))
-        count = self._advance(self._p, self._c, self._s, ticks, _ffi.cast("double *", rows.ctypes.data), every)
+        rows = np.empty((ticks // every + 2 if every else 0, len(WHOLE if whole else TRACE)))
+        count = self._advance(self._p, self._c, self._s, ticks, _ffi.cast("double *", rows.ctypes.data), every, whole)
         return rows[:count]
 
 
