@@ -73,6 +73,14 @@ class Plant:
         """
         setattr(self._c, name, value)
 
+    def get(self, name: str) -> float:
+        """A parameter of the firmware, SI.
+
+        Raises:
+            AttributeError: there is no such parameter.
+        """
+        return float(getattr(self._c, name))
+
     def switch(self, *, currents: bool | None = None, bearings: bool | None = None, axial: bool | None = None,
                angle: bool | None = None) -> None:  # fmt: skip
         """Switch the current loops, the radial loops, that of z and that of the angle."""
