@@ -11,6 +11,7 @@ import numpy as np
 from bench.rigfile import registers
 from bench.rigfile.registers import Register, WordOrder
 from bench.wire import isotp
+from benchmarks.fuzz_commandline import commandline_block
 from benchmarks.fuzz_draws import INPUTS, Block, Draw
 from benchmarks.fuzz_streams import serial_block, slcan_block
 
@@ -152,4 +153,5 @@ TARGETS: Final[dict[str, Callable[[Draw], Block]]] = {
     "serial": serial_block,
     "isotp": isotp_block,
     "registers": registers_block,
+    "terminal": commandline_block,
 }
