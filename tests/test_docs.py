@@ -210,3 +210,24 @@ def test_links_lead_somewhere() -> None:
     for page in [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]:
         for target in re.findall(r"\]\(([^)#:]+)\)", page.read_text(encoding="utf-8")):
             assert (page.parent / target).exists(), f"{page.name}: {target}"
+
+
+FENCED = re.compile(r"```.*?```", re.DOTALL)
+HEADING = re.compile(r"^#+ (.*)$", re.MULTILINE)
+ANCHORED = re.compile(r"\]\(([^)#\s:]*)#([^)\s]+)\)")
+
+
+def anchor(heading: str) -> str:
+    """What a heading is linked by: lower case, spaces as hyphens, without other marks."""
+    words = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading).strip().lower()
+    return re.sub(r"[^\w\- ]", "", words).replace(" ", "-")
+
+
+def test_links_into_pages_lead_to_headings() -> None:
+    pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md"), *(ROOT / "examples").rglob("*.md")]
+    texts = {page.resolve(): FENCED.sub("", page.read_text(encoding="utf-8")) for page in pages}
+    known = {page: {anchor(h) for h in HEADING.findall(text)} for page, text in texts.items()}
+    for page, text in texts.items():
+        for target, place in ANCHORED.findall(text):
+            aimed = (page.parent / target).resolve() if target else page
+            assert aimed not in known or place in known[aimed], f"{page.name}: {target}#{place}"
