@@ -29,6 +29,7 @@ ROUNDING = Influence(
 )
 """All that is left of gamma at its bound. It takes a step of its slew up or down in each tick; a capture of every tenth tick
 has the same means within a hundredth of a step, for noise decides which way."""
+SAME_RAD, STOOD = 1e-7, 5  # means of bins in which gamma stood at a bound all the time, and how many of them show one
 SENSORS = tuple(f"{what}_m{k}" for what in ("gain", "offset") for k in range(1, 5))
 
 
@@ -188,9 +189,11 @@ def noise(i: Complex) -> tuple[float, float]:
 
 
 def extreme(gamma: Array, limit: float) -> float:
-    """Greatest |gamma| of (bins,): the bound where it stood there."""
+    """Greatest |gamma| of (bins,): the bound where it stood there, be it the one that was asked for or another. A smooth top
+    has hardly two bins alike within its noise, and a parabola through a flat one is too high by up to 1 %."""
     size = np.abs(gamma)
-    return float(size.max()) if size.max() > 0.995 * limit else fit.peak(size)
+    stood = int((size > size.max() - SAME_RAD).sum()) >= STOOD
+    return float(size.max()) if stood or size.max() > 0.995 * limit else fit.peak(size)
 
 
 def _of_group(t: Turns, plan: Plan, given: Mapping[str, Estimate]) -> dict[str, Estimate]:

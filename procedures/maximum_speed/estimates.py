@@ -218,7 +218,7 @@ def _ripples(of: Mapping[str, Shared]) -> dict[str, Estimate]:
     for s, name in ((HALF, "half"), (OP, "op")):
         total = Estimate.exact(0.0, "rad/s")
         for d, way in WAYS.items():
-            found = fit.ripple(np.array([w.turning.swings for w in of[s].windows if w.direction == d]))
+            found = fit.ripple(np.array([w.swings for w in of[s].windows if w.direction == d]))
             n = len(found.off)
             u = math.sqrt(float((found.off**2).sum()) / (n - 1) / n)
             scatter = Influence(id=f"scatter/ripple/{s}/{way}", name=f"scatter of the runs, {way}", u=u, unit="rad/s", kind="A",

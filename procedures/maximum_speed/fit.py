@@ -44,14 +44,12 @@ def share(limit: float, i_x: Array, i_y: Array, sharing: str) -> Array:
 
 @dataclass(frozen=True)
 class Turning:
-    """Mean `speed` over whole turns, which the first `samples` are, rad/s with its sign; `seconds` that they last; `swings` of
-    the speed with cos and sin of orders 1 to 4 of the rotor's angle, (8,) rad/s."""
+    """Mean `speed` over whole turns, which the first `samples` are, rad/s with its sign; `seconds` that they last."""
 
     speed: float
     turns: int
     samples: int
     seconds: float
-    swings: Array
 
 
 def turning(t: Array, angle: Array) -> Turning:
@@ -59,8 +57,7 @@ def turning(t: Array, angle: Array) -> Turning:
 
     A whole number of turns, so that what the encoder says wrongly over a turn is left out, and what runout does to the speed.
     Over them theta = theta_0 + w t + sum a_n cos(n theta) + b_n sin(n theta) is fitted to every sample: w takes part in the
-    counts of all of them, and not of the two at the ends alone. What swings is taken from the rates between samples: noise
-    makes the angle wander, which fills all orders of a short window, and the speed does not.
+    counts of all of them, and not of the two at the ends alone.
 
     Raises:
         AnalysisError: it turns less than twice.
@@ -76,9 +73,20 @@ def turning(t: Array, angle: Array) -> Turning:
     last = int(np.searchsorted(turned, 2 * math.pi * turns))
     x, time = unwrapped[:last], t[:last] - t[0]
     speed = float(np.linalg.lstsq(np.column_stack([_orders(x), time]), x, rcond=None)[0][-1])
-    rates, between = np.diff(x) / np.diff(time), (x[1:] + x[:-1]) / 2
-    swings: Array = np.linalg.lstsq(_orders(between), rates, rcond=None)[0][1:]
-    return Turning(speed, turns, last, float(time[-1]), swings)
+    return Turning(speed, turns, last, float(time[-1]))
+
+
+def swings(t: Array, angle: Array) -> Array:
+    """What the speed swings by with cos and sin of orders 1 to 4 of the rotor's angle, (8,) rad/s: of unwrapped angles (n,) rad
+    of whole turns at times (n,) s.
+
+    It is taken from the rates between samples: noise makes the angle wander, which fills all orders of a short window, and the
+    speed does not. The counts of the encoder beat with the samples: where nearly a whole number of them passes from one sample
+    to the next, their rounding goes round slowly and looks like an order. At 1 kHz that is so near every 1.53 rad/s, at 10 kHz
+    near every 15.3.
+    """
+    rates, between = np.diff(angle) / np.diff(t), (angle[1:] + angle[:-1]) / 2
+    return np.asarray(np.linalg.lstsq(_orders(between), rates, rcond=None)[0][1:], dtype=np.float64)
 
 
 def _orders(angle: Array) -> Array:

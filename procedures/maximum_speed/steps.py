@@ -24,10 +24,10 @@ GUARDED, UNSTEADY, NOT_CARRIED, SET_POINT = "guarded", "unsteady", "not-carried"
 SHARED = "sharing"  # event: the segments are shared another way from now on
 """Events: the rotor reached the speed that guards the run; its speed did not become steady; no set point makes the motor carry
 what was asked for; where it holds its end."""
-DEMANDS, GIVEN, BOUND, SHARE = ("demand_x", "demand_y"), "torque_given", "torque_bound", "lambda"
+TURNED, DEMANDS, GIVEN, BOUND, SHARE = "angle", ("demand_x", "demand_y"), "torque_given", "torque_bound", "lambda"
 ACROSS = ("i_d1", "i_d2", "i_d3", "i_d4")
-"""What a capture of the controller calls what its law asks for, gives and allows, and the segments' currents across the
-field."""
+"""What a capture of the controller calls the angle, what its law asks for, gives and allows, and the segments' currents
+across the field."""
 AT_BOUND_A = 1e-3  # of the bound, and what is given is all there is
 
 
@@ -43,6 +43,10 @@ def channels(machine: Servomotor) -> tuple[str, ...]:
 
 def captured(machine: Servomotor) -> tuple[str, ...]:
     """What is captured in it."""
+    return (TURNED, *_of_law(machine))
+
+
+def _of_law(machine: Servomotor) -> tuple[str, ...]:
     return (*DEMANDS, GIVEN, BOUND, SHARE, *machine.segments, *ACROSS)
 
 
@@ -68,12 +72,14 @@ class Told:
 
 @dataclass(frozen=True)
 class Window:
-    """One window: what was asked, how it turned, mean currents of segments (4,) and coils, flags, its capture."""
+    """One window: what was asked, how it turned, what its speed `swings` by with the turn (8,) rad/s, mean currents of segments
+    (4,) and coils, flags, its capture."""
 
     sharing: str
     direction: int
     repeat: int
     turning: Turning
+    swings: Array
     segments: Array
     coils: Mapping[str, float]
     flags: int
@@ -123,6 +129,7 @@ def _read(recording: Recording[Plan], step: Step, machine: Servomotor, limit_A: 
     return Window(
         sharing=str(labels["sharing"]), direction=int(labels["direction"]), repeat=int(labels["repeat"]),
         turning=turning,
+        swings=swings_of(captures[0], turning, t[whole], data[ANGLE][whole]),
         segments=np.array([float(data[c][whole].mean()) for c in machine.segments]),
         coils={c: float(data[c].mean()) for c in coils(machine)},
         flags=int(np.bitwise_or.reduce(flags)),
@@ -131,11 +138,29 @@ def _read(recording: Recording[Plan], step: Step, machine: Servomotor, limit_A: 
     )  # fmt: skip
 
 
-def _told(capture: Captured, machine: Servomotor, sharing: str, limit_A: float, speed: float) -> Told:
+def swings_of(capture: Captured, turning: Turning, t: Array, angle: Array) -> Array:
+    """Of the captured angle. Recordings from before it was captured have that of the telemetry, (n,) of the same turns."""
+    if TURNED in capture.channels:
+        angle = capture.arrays(TURNED)[TURNED][: _whole(capture, turning.speed)]
+        t = np.arange(len(angle)) / capture.rate_hz
+    return fit.swings(t, np.unwrap(angle))
+
+
+def _whole(capture: Captured, speed: float) -> int:
+    """Samples of a capture that are whole turns.
+
+    Raises:
+        AnalysisError: there is none.
+    """
     whole = fit.whole_turns(capture.samples, capture.rate_hz, speed)
     if not whole:
         raise AnalysisError(f"capture of a run at {speed:.1f} rad/s: found less than a turn; expected one at least")
-    data = {name: x[:whole] for name, x in capture.arrays(*captured(machine)).items()}
+    return whole
+
+
+def _told(capture: Captured, machine: Servomotor, sharing: str, limit_A: float, speed: float) -> Told:
+    whole = _whole(capture, speed)
+    data = {name: x[:whole] for name, x in capture.arrays(*_of_law(machine)).items()}
     i_x, i_y = (data[name] for name in DEMANDS)
     along, across = (np.array([data[c] for c in names]) for names in (machine.segments, ACROSS))
     return Told(

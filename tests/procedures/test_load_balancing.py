@@ -16,6 +16,7 @@ from bench.findings import Finding
 from bench.rigfile import load_rig
 from bench.uncertainty import interval
 from procedures.load_balancing import fit
+from procedures.load_balancing.estimates import extreme
 from procedures.load_balancing.fit import Law
 from procedures.load_balancing.plan import Plan
 from sim_backend.truth import nominal
@@ -86,6 +87,15 @@ def test_drawn_rigs_do_what_their_loads_say(tmp_path: Path, rig: str, seed: int)
     cut = found["gamma_extreme@forward"] > math.radians(7.99)
     assert found["unbalance_ratio@forward"] < 1 / (1.5 if cut else 2.5)
     assert (rig == "tsbs12") == cut
+
+
+def test_a_phase_angle_that_stands_at_another_bound_than_was_asked_is_read_there() -> None:
+    """A top of 8.2 degrees with noise of 0.1 mrad, and cut off at 6.8: a parabola through the flat part has 0.02 more."""
+    phase, noise = 2 * math.pi * np.arange(400) / 400, np.random.default_rng(3)
+    free = math.radians(8.2) * np.sin(phase) + 1e-4 * noise.standard_normal((8, 400)).mean(axis=0)
+    assert extreme(free, math.radians(9)) == pytest.approx(math.radians(8.2), abs=5e-5)
+    cut = np.clip(free, -math.radians(6.8), math.radians(6.8))
+    assert extreme(cut, math.radians(9)) == pytest.approx(math.radians(6.8), abs=1e-7)
 
 
 @pytest.mark.parametrize(

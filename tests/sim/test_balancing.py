@@ -37,3 +37,10 @@ def test_the_printed_reduction_and_what_wrapping_leaves_of_it() -> None:
     assert circled("tsbs12-offset", 1, -1, **truth)["reduction", ""] == pytest.approx(-0.26, abs=0.02)
     wrapped = circled("tsbs12-offset", 1, -1, **truth, factor_balance=2.0)
     assert wrapped["reduction", ""] == pytest.approx(-0.023, abs=0.015)
+
+
+def test_a_bound_that_is_another_than_was_asked_is_a_bound_to_the_truth_too() -> None:
+    """A top cut off at 0.7 of the limit: a parabola through its flat part is 1.2 % above what gamma goes to."""
+    asked = {**nominal(load_rig("tsbs12-offset")), "factor_gamma_max": 0.7}
+    found = circled("tsbs12-offset", 1, -1, **asked)
+    assert found["gamma_extreme", ""] == pytest.approx(0.7 * LIMIT, rel=1e-4)

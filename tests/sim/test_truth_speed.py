@@ -23,3 +23,11 @@ def test_a_part_of_a_turn_changes_neither_speed_nor_bound(seconds: float) -> Non
     assert speed == pytest.approx(math.sqrt(43.0**2 - 0.3**2), abs=2e-5)
     assert bound == pytest.approx(4.0, abs=1e-3)
     assert ripple == pytest.approx(0.3 / math.sqrt(2), rel=0.02)
+
+
+def test_counts_that_beat_with_a_millisecond_are_no_ripple() -> None:
+    """At 43.01 counts a millisecond the rounding goes round once a turn: every tenth tick alone would show 46 mrad/s of a rotor
+    that turns evenly."""
+    count = 2 * math.pi / 4096
+    angle = 2 * math.pi * 43000 / 4095 * TICK_S * np.arange(round(4.0 / TICK_S))
+    assert over_turns(np.round(angle / count) * count, np.ones(len(angle)))[2] < 2e-3

@@ -78,7 +78,7 @@ def _moved(rig: RigFile, drawn: Truth, p: PlantParams, asked: CircleAsked, branc
     control = ControlParams(**{f.name: plant.get(f.name) for f in fields(ControlParams)})
     paths = (_path(before[0]), _path(after[0]))
     return out | {
-        ("gamma_extreme", ""): _extreme(np.abs(_mean(after[1][:, GAMMA])), asked.balanced_limit),
+        ("gamma_extreme", ""): _extreme(np.abs(_mean(after[1][:, GAMMA])), control.gamma_max),
         ("reduction", ""): out["peak_i_y", "after"] / out["peak_i_y", "before"] - 1,
         ("unbalance_ratio", ""): out["unbalance", "after"] / out["unbalance", "before"],
         ("predicted_reduction", ""): quasi_static(p, control, asked, branch, paths),
@@ -121,7 +121,8 @@ def _top(x: Array) -> float:
 
 
 def _extreme(gamma: Array, limit: float) -> float:
-    """A top that is cut off at the limit, or nearly, is no parabola."""
+    """A top that is cut off at the limit that the machine has, which a defect may make another than what was asked, or nearly,
+    is no parabola."""
     return float(gamma.max()) if gamma.max() > CUT * limit else _top(gamma)
 
 
