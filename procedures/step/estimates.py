@@ -32,7 +32,9 @@ RISE_SHARE, SMOOTH = 0.012, 3.6
 # Of the bandwidth b: what the sampling rate r folds onto it from r - b. From a tenth of r - b on it falls as the cube of
 # b/(r - b): response and mean together lose three orders there (0.0007 at 0.061 without noise, 0.001 at 0.07).
 ALIAS, FOLDED = 3e-3, 0.1
-HARMONIC = 0.1  # of the directions' difference of overshoot: the top's second harmonic, which oscillations leave out
+# Of the directions' difference of overshoot, times the square of what half a swing leaves of the swing: the second harmonic at
+# the top, which oscillations leave out. Without noise 0.07 to 0.45 (`harmonic_left`).
+HARMONIC = 0.45
 START_S = 1e-4  # how well the control currents tell when the set point acted
 # Second-order effect of a step's size over the square of its first-order effect: damping either way; frequency from none to
 # less by this much, since what bearings have of quadratic and cubic forces softens them (Landau, Mechanics, section 28).
@@ -83,7 +85,7 @@ def by_case(steps: list[Done], rig: RigFile, band: float) -> dict[Case, Result]:
         found["steady_error"] += _gained(case, rig)
         other = seen["overshoot"].values.get(replace(case, way=-case.way))
         if "overshoot" in found and other is not None:
-            half = HARMONIC * abs(found["overshoot"].value - other)
+            half = harmonic_left(found["overshoot"].value - other, fits[case][0])
             found["overshoot"] += bound(f"harmonic/{case.where}", "second harmonic of the swing", half, "1")
         if "bandwidth" in found:
             folded = aliased(found["bandwidth"].value, period)
@@ -102,6 +104,15 @@ def aliased(bandwidth: float, period: float) -> float:
     """Half width of what sampling every `period` s folds onto a bandwidth, Hz; all of ALIAS where the rate is not above it."""
     above = 1 / period - bandwidth
     return ALIAS * bandwidth * min(1.0, (bandwidth / above / FOLDED) ** 3 if above > 0 else 1.0)
+
+
+def harmonic_left(difference: float, swing: Swing) -> float:
+    """Half width of what a fit leaves out of an overshoot by which the directions differ so much.
+
+    Quadratic forces of a loaded bearing make the directions differ by another stiffness where they end, which each direction's
+    own poles have, and by a second harmonic, which they have not: it goes with the square of the swing at its top, half a swing
+    after the step: e^(2 pi Re p/Im p)."""
+    return HARMONIC * math.exp(2 * math.pi * swing.pole.real / swing.pole.imag) * abs(difference)
 
 
 def _one(d: Done) -> One:

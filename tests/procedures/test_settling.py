@@ -115,6 +115,16 @@ def test_a_tail_along_the_bands_edge_is_told_where_it_crosses_and_left_open_wher
     assert not never.open
 
 
+@pytest.mark.parametrize("tail", [0.22, 0.225, 0.23, 0.235])
+def test_what_fades_fast_crosses_the_bands_edge_when_it_does(tail: float) -> None:
+    """Where the swing is gone the curve was looked at every 5 ms, and straight lines between: up to 50 us late, at which a fast
+    integrator's interval is half as wide."""
+    steps, case = made(0.6, tail=tail, constant=0.06, noise=1e-10), Case("A", 0.0, "y", 10e-6, 1)
+    curve = settling.fit(steps, np.array([POLE * 1.003, POLE * 0.997]), POLE, 0.06)
+    found = settling.settling(curve, case, [d for d in steps if d.case == case], 0.02)
+    assert found.time == pytest.approx(true_time(0.6, tail=tail, constant=0.06), abs=4e-6)
+
+
 def test_nothing_is_told_beyond_the_shortest_record() -> None:
     """Records of a live run end when its computer comes round to it. A curve says nothing where it was not fitted to all."""
     short, long = (made(0.6, tail=0.02, constant=0.3, record=record, seed=5) for record in (1.0, 3.0))
