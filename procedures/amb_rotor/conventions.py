@@ -67,8 +67,7 @@ class AmbRotor:
 
     @property
     def contact(self) -> Status:
-        """A touch anywhere."""
-        return reduce(or_, self.rings.values(), self.axial_stop)
+        return reduce(or_, self.rings.values(), self.axial_stop)  # a touch anywhere
 
     @property
     def all_axes(self) -> tuple[str, ...]:
@@ -129,9 +128,10 @@ class AmbRotor:
                      if f"{kind}_{axis}" in self.can.model)  # fmt: skip
 
     @property
-    def biases(self) -> tuple[str, ...]:
-        """The parameters of the radial bearings' bias currents, each once."""
-        return tuple(dict.fromkeys(self.can.bias[plane] for plane in self.planes if plane in self.can.bias))
+    def biases(self) -> dict[str, str]:
+        """By radial axis, the parameter of its own bearing's bias current; nothing where the rig file binds none."""
+        of = self.can.bias
+        return {self.axes[k]: of[plane] for plane, pair in self.planes.items() if plane in of for k in pair}
 
     @property
     def lifting(self) -> dict[str, float]:

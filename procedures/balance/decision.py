@@ -57,7 +57,9 @@ def _loop_is_known(rig: RigFile, plan: Plan) -> bool:
     machine = conventions(rig)
     if not bearings.has_model(rig):
         return False
-    gained = all(machine.gain(key, machine.axes[0]) for key in ("kp", "kd")) and bool(machine.biases)
+    gained = all(machine.gain(key, machine.axes[0]) for key in ("kp", "kd")) and all(
+        axis in machine.biases for axis in machine.axes
+    )
     return plan.law in machine.can.flatness or gained
 
 
@@ -66,7 +68,7 @@ def _amplified(rig: RigFile, plan: Plan, stand: Stand) -> float:
     p = {n: q.default for n, q in rig.parameters.items()}
     machine = conventions(rig)
     if (flat := machine.can.flatness.get(plan.law)) is None:
-        means = np.concatenate([np.zeros(4), np.full(8, p[machine.biases[0]])])
+        means = np.concatenate([np.zeros(4), np.repeat([p[machine.biases[a]] for a in machine.axes], 2)])
         kp, kd = (p[machine.gain(key, machine.axes[0])] for key in ("kp", "kd"))
         plus, minus, k_x = runout.slopes(stand, means)
         force = float((plus - minus)[[0, 2]].sum())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -107,13 +106,11 @@ def _compare(a: Analysis) -> Finding:
     said = []
     for axis, f in a.fits.items():
         gap = a.adjusted.values[magnetics.gap_key(a.held.machine, axis)]
-        k, stiffness = magnetics.slopes(f.terms, gap, a.bias_A)
         one, two = f.linear.terms
-        true = (
-            f"true slopes {k:.3g} and {stiffness * 1e-3:.3g}"
-            if math.isfinite(a.bias_A)
-            else "true slopes not told without a bias"
-        )
+        true = "true slopes not told without a bias"
+        if axis in a.bias_A:
+            k, stiffness = magnetics.slopes(f.terms, gap, a.bias_A[axis])
+            true = f"true slopes {k:.3g} and {stiffness * 1e-3:.3g}"
         said.append(f"{axis}: {one:.3g} N/A and {two * 1e-3:.3g} N/mm, {true}")
     sample, batch = (1e3 * max(x[k] for x in a.noise_N.values()) for k in (0, 1))
     text = (

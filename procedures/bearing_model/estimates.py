@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,6 +19,7 @@ from procedures.amb_rotor.places import Held
 from procedures.bearing_model import comparison
 from procedures.bearing_model.adjustment import Adjusted, adjust
 from procedures.bearing_model.comparison import Sums
+from procedures.bearing_model.grid import bias_by_axis
 from procedures.bearing_model.inputs import LOADED, fit_inputs
 from procedures.shared.type_a import scatter
 
@@ -29,9 +31,10 @@ TRUST = 1e-4  # of the load: jitter of currents whose squares count, bending, th
 class Analysis:
     """Everything the measurements, findings and figures are made of.
 
-    `statics` of all positions and `compared` of those at `bias_A`, which both models are compared on, with the adjusted
-    inputs; `noise_N` is the standard deviation of a sample's and of a batch's force within its step, by axis; `inputs` as
-    certified; `samples` how many there are in the comparison; `offsets_known` m by axis, what the controller takes them for.
+    `statics` of all positions and `compared` of those of the first pass, which both models are compared on, with the adjusted
+    inputs; `bias_A` of that pass by axis, of bearings that have one; `noise_N` is the standard deviation of a sample's and of
+    a batch's force within its step, by axis; `inputs` as certified; `samples` how many there are in the comparison;
+    `offsets_known` m by axis, what the controller takes them for.
     """
 
     held: Held
@@ -42,7 +45,7 @@ class Analysis:
     adjusted: Adjusted
     estimates: dict[str, Estimate]
     noise_N: dict[str, tuple[float, float]]
-    bias_A: float
+    bias_A: dict[str, float]
     samples: int
     offsets_known: dict[str, float]
 
@@ -53,13 +56,13 @@ def evaluate(recording: Recording[Any], held: Held) -> Analysis:
     Raises:
         AnalysisError: the positions determine nothing.
     """
-    bias = float(held.labels["bias_A"][0])
+    first, bias = float(held.labels["bias_A"][0]), bias_by_axis(recording.rig, recording.plan)
     inputs = fit_inputs(recording.rig, recording.plan.coupled)
     values = {name: e.value for name, e in inputs.items()}
     unloaded = find_unloaded(held, values)
     found = adjust(held.means(), inputs, *_start(held, values, unloaded), unloaded)
     s = magnetics.statics(held.means(), found.values)
-    chosen = held.chosen(held.labels["bias_A"] == bias) if math.isfinite(bias) else held
+    chosen = held.chosen(held.labels["bias_A"] == first) if math.isfinite(first) else held
     compared = magnetics.statics(chosen.means(), found.values)
     estimates = dict(found.estimates)
     fits, noise = {}, {}
@@ -75,7 +78,7 @@ def evaluate(recording: Recording[Any], held: Held) -> Analysis:
         estimates |= sums.estimates(a)
         noise[a] = sums.noise_N
     estimates |= comparison.by_bearing(estimates, held.machine)
-    estimates |= of_slopes(found, held.machine, bias) if math.isfinite(bias) else {}
+    estimates |= of_slopes(found, held.machine, bias)
     return Analysis(held, s, compared, fits, inputs, found, estimates, noise, bias, len(chosen.of_step),
                     _offsets_known(recording, held.machine))  # fmt: skip
 
@@ -91,15 +94,15 @@ def find_unloaded(held: Held, values: dict[str, float]) -> tuple[int, ...]:
     return tuple(k for k in range(len(load)) if load[k] < LOADED * load.max())
 
 
-def of_slopes(found: Adjusted, machine: AmbRotor, bias: float) -> dict[str, Estimate]:
-    """K_i and K_x by axis, slopes of the force at the magnetic centre with the bias in both coils: K_i = 4 beta i_b / gap^2,
-    K_x = 4 beta i_b^2 / gap^3. What the gap has in beta it mostly takes out of them again."""
+def of_slopes(found: Adjusted, machine: AmbRotor, bias: Mapping[str, float]) -> dict[str, Estimate]:
+    """K_i and K_x by axis, slopes of the force at the magnetic centre with the bias i_b of its own bearing in both coils:
+    K_i = 4 beta i_b / gap^2, K_x = 4 beta i_b^2 / gap^3. What the gap has in beta it mostly takes out of them again."""
     out = {}
-    for a in machine.axes:
+    for a, current in bias.items():
         if f"beta_{a}" in found.estimates:
             beta, gap = found.estimates[f"beta_{a}"], found.estimates[gap_key(machine, a)]
-            out[f"K_i_{a}"] = beta / (gap * gap) * (4 * bias)
-            out[f"K_x_{a}"] = beta / (gap * gap * gap) * (4 * bias**2)
+            out[f"K_i_{a}"] = beta / (gap * gap) * (4 * current)
+            out[f"K_x_{a}"] = beta / (gap * gap * gap) * (4 * current**2)
     return out
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -57,7 +58,7 @@ def _residuals(a: Analysis) -> Iterator[Figure]:
     of_linear = {axis: f.linear.residuals for axis, f in a.fits.items()}
     of_nonlinear = {axis: -f.residuals for axis, f in a.fits.items()}
     for key, name, at, residuals in (
-        ("residuals-linear", f"linear model without intercept (T 2.9) at {a.bias_A:g} A", a.compared, of_linear),
+        ("residuals-linear", f"linear model without intercept (T 2.9){_at(a)}", a.compared, of_linear),
         ("residuals-nonlinear", "nonlinear model (T 2.8)", a.statics, of_nonlinear),
     ):
         series = tuple(
@@ -68,9 +69,15 @@ def _residuals(a: Analysis) -> Iterator[Figure]:
         yield Figure(key, title, caption, DISPLACEMENT, "residual (mN)", series, lines=(("zero", 0.0),))
 
 
+def _at(a: Analysis) -> str:
+    """The bias of the comparison, of every bearing where they differ."""
+    return f" at {' and '.join(f'{x:g}' for x in dict.fromkeys(a.bias_A.values()))} A" if a.bias_A else ""
+
+
 def _forces(a: Analysis) -> Figure:
     """Force of the magnets at equal currents over position: the fit's, and the linear model's line."""
-    axis, bias = next(iter(a.fits)), a.bias_A
+    axis = next(iter(a.fits))
+    bias = a.bias_A.get(axis, math.nan)
     k = a.held.machine.axes.index(axis)
     f = a.fits[axis]
     r = np.linspace(float(a.compared.r[k].min()), float(a.compared.r[k].max()), 60)

@@ -59,13 +59,13 @@ def _biases(rig: RigFile, plan: Plan) -> Iterator[str]:
         return
     bound = machine.can.current_limit
     limit = rig.parameters[bound].default if bound else rig.envelope.max_current_A
-    for name in machine.biases[:1]:
+    for name in dict.fromkeys(machine.biases.values()):
         allowed = rig.parameters[name]
         low, high = allowed.low, min(allowed.high, limit / 2)
         for bias in plan.biases_A:
             if not low <= bias <= high:
                 yield (
-                    f"biases_A: found {bias:g} A; parameter and amplifiers, which have to give twice that, leave {low:g} to "
+                    f"biases_A: found {bias:g} A; {name} and amplifiers, which have to give twice that, leave {low:g} to "
                     f"{high:g} A"
                 )
         if allowed.when == "resting" and len(plan.biases_A) > 1:

@@ -33,9 +33,16 @@ def places(rig: RigFile, plan: Plan) -> list[tuple[float, float]]:
 
 
 def biases(rig: RigFile, plan: Plan) -> tuple[float, ...]:
-    """Of each pass, A: the plan's; else one pass with that of the controller, as it is set."""
-    names = conventions(rig).biases
-    return plan.biases_A or ((rig.parameters[names[0]].default,) if names else (math.nan,))
+    """Of each pass, A: the plan's; else one pass with that of the controller, as it is set, no number where it has none or
+    its bearings have different ones."""
+    alike = {rig.parameters[name].default for name in conventions(rig).biases.values()}
+    return plan.biases_A or ((alike.pop(),) if len(alike) == 1 else (math.nan,))
+
+
+def bias_by_axis(rig: RigFile, plan: Plan) -> dict[str, float]:
+    """Of the first pass, A, of each axis whose bearing has a bias: a plan sets all alike, a controller has its own of each."""
+    return {axis: plan.biases_A[0] if plan.biases_A else rig.parameters[name].default
+            for axis, name in conventions(rig).biases.items()}  # fmt: skip
 
 
 def find_room(rig: RigFile) -> float:

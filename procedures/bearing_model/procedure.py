@@ -76,7 +76,7 @@ def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
     """Controller parameters that the runner writes before levitation: flatness with constant current sum."""
     machine = conventions(rig)
     integrating = machine.can.settings.get("integrator", {}).get("on", {})
-    first = dict.fromkeys(machine.biases, plan.biases_A[0]) if plan.biases_A else {}
+    first = dict.fromkeys(machine.biases.values(), plan.biases_A[0]) if plan.biases_A else {}
     return {**machine.select(plan.law), **first, **integrating}
 
 
@@ -137,7 +137,7 @@ def _lift(rig: Rig, record: Recorder) -> bool:
 
 def _set_bias(rig: Rig, plan: Plan, bias: float) -> None:
     """In small steps: each one is a push, until the integrators have taken it up."""
-    biases = conventions(rig.file).biases
+    biases = tuple(dict.fromkeys(conventions(rig.file).biases.values()))
     before = rig.levitation.get(biases[0])
     count = math.ceil(abs(bias - before) / BIAS_STEP_A - 1e-3)
     for k in range(count):

@@ -46,7 +46,7 @@ def amplitude(rig: RigFile, plan: Plan) -> float:
     """Of a sine, A: the plan's, or a share of the bias."""
     if plan.sine_A is not None:
         return plan.sine_A
-    names = conventions(rig).biases
+    names = conventions(rig).biases.values()
     most = rig.envelope.max_injection_A
     wanted = OF_BIAS * min(rig.parameters[name].default for name in names) if names else UNKNOWN_A
     return min(wanted, most) if most is not None else wanted

@@ -35,13 +35,13 @@ def faded_s(machine: AmbRotor, settings: Mapping[str, float], axis: str, band: f
 
 def _left_s(machine: AmbRotor, of: Mapping[str, float], axis: str, share: float) -> float:
     """Until what the integrator has still to do is that share of the step; 0 where there is nothing to do for it."""
-    one = machine.along(axis)[0]
-    kp, ki = machine.gain("kp", one), machine.gain("ki", one)
-    biases = [name for name in machine.biases if name in of]
+    along = machine.along(axis)
+    kp, ki = machine.gain("kp", along[0]), machine.gain("ki", along[0])
+    biased = all(machine.biases.get(one) in of for one in along)
     plain = all(of.get(name) == value for name, value in machine.select(machine.plain_law).items())
-    if not plain or not {kp, ki} <= of.keys() or not biases:
+    if not plain or not {kp, ki} <= of.keys() or not biased:
         return 0.0
-    softer = of[biases[0]] * max(_stiffness(machine, of, one) for one in machine.along(axis))
+    softer = max(of[machine.biases[one]] * _stiffness(machine, of, one) for one in along)
     if not 0 < softer < of[kp]:
         return 0.0
     beyond, constant = softer / (of[kp] - softer), (of[kp] - softer) / of[ki] if of[ki] else math.inf
