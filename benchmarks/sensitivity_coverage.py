@@ -76,7 +76,9 @@ def _taken(plant: AmbPlant, plan: Plan, axis: str, kind: str, about: float, comb
     columns = {n: trace[:, TRACE.index(n)] for n in names}
     grid = Grid(np.array(comb.hz), comb.period_s, comb.amplitude)
     response: Response
-    response, injected, excluded = sensitivity(columns, (start + np.arange(len(trace))) * 1e-4, 1e4, grid)
+    response, injected, excluded = sensitivity(
+        columns, (start + np.arange(len(trace))) * 1e-4, 1e4, grid, ("pulses", "pulse_age")
+    )
     return Taken(axis, speed, 0.0, kind, about, grid, response, excluded, injected, 0.0, 0.0, None, 1e4, 0, 0, 0, 1,
                  AMB_ROTOR)  # fmt: skip
 

@@ -96,7 +96,11 @@ class ControllerCapture:
                 f"capture: one is {state} already, and the controller records one at a time: wait, or cancel()"
             )
         if status != "OK":
-            raise BenchError(f"capture: the controller refuses it: {status}; its memory is {reply['memory']:.0f} bytes")
+            asked = f"channels {', '.join(layout.channels)}; trigger {waits_for(trigger)}; {length} samples"
+            raise BenchError(
+                f"capture: the controller refuses it: {status}; asked for were {asked}; its memory is "
+                f"{reply['memory']:.0f} bytes"
+            )
         self._armed = layout, trigger, int(reply["number"])
 
     def wait(self, timeout_s: float) -> None:
@@ -113,7 +117,7 @@ class ControllerCapture:
                 return
             left = timeout_s - (self._clock.now_ns() - begin) * 1e-9
             if left <= 0:
-                for_what = f" for {trigger.kind} {trigger.channel} {trigger.level:g}" if state == "ARMED" else ""
+                for_what = f" for {waits_for(trigger)}" if state == "ARMED" else ""
                 raise BenchError(
                     f"capture: not recorded within {timeout_s:g} s: it is {state}{for_what}, {reply['samples']:.0f} samples so "
                     "far. Next: a longer time, another trigger, or cancel()"
@@ -235,3 +239,10 @@ class ControllerCapture:
 
     def _code(self, name: str) -> int:
         return self._rig.messages.code("CaptureAsk", "code", name)
+
+
+def waits_for(trigger: Trigger) -> str:
+    """A trigger, for the reader."""
+    if trigger.kind in ("NOW", "PULSE"):
+        return trigger.kind
+    return " ".join(word for word in (trigger.kind, trigger.channel, f"{trigger.level:g}") if word)

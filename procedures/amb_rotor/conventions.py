@@ -14,6 +14,7 @@ from operator import or_
 from bench.errors import Lacking
 from bench.rigfile import RigFile
 from bench.rigfile.capabilities import Capabilities
+from bench.rigfile.recorded import AGE, COUNT, pulsed, recorded
 from bench.rigfile.roles import ANGLE, SPEED, Status, is_bound
 from bench.rigfile.supports import axial_support, least_clearance, once_per_rig, two_planes
 from procedures.amb_rotor import loops
@@ -61,6 +62,10 @@ class AmbRotor:
     speed_told: bool
     marked: bool  # whether the angle and the speed are told by a mark
     clearance: float  # the least of the rings', m; infinite where the rig has none
+    pulsed: tuple[str, ...] = (
+        COUNT,
+        AGE,
+    )  # channels of a capture: the mark's count, its age; none where it has not both
     lacks: tuple[str, ...] = ()  # where the rig is not as these procedures take it
     crooked: tuple[str, ...] = ()  # where it is not two planes of like axes; what goes by rows takes it
     unweighed: tuple[str, ...] = ()  # where it is not as those take it that go by the shaft's weight
@@ -101,7 +106,7 @@ class AmbRotor:
 
     @property
     def voltages(self) -> tuple[str, ...]:
-        """Channels of the radial coils' voltages; none where the rig does not tell them all."""
+        """Captured channels of the radial coils' voltages; none where the rig does not tell or record them all."""
         if not all(axis in self.coil_voltages for axis in self.axes):
             return ()
         return tuple(name for axis in self.axes for name in self.coil_voltages[axis])
@@ -284,7 +289,7 @@ def conventions(rig: RigFile) -> AmbRotor:
         rings=dict(zip((plane.name for plane in planes), AMB_ROTOR.rings.values(), strict=True)),
         probes={axis.name: axis.position for axis in everywhere if axis.position},
         pulls={axis.name: (axis.coils[0], axis.coils[1]) for axis in everywhere if len(axis.coils) == 2},
-        coil_voltages={a.name: (a.voltages[0], a.voltages[1]) for a in everywhere if len(a.voltages) == 2},
+        coil_voltages={a.name: (a.voltages[0], a.voltages[1]) for a in everywhere if recorded(rig, a.voltages) == 2},
         plane_voltages=told if all(told) else (),
         can=rig.capabilities,
         stations=stations(rig),
@@ -297,4 +302,5 @@ def conventions(rig: RigFile) -> AmbRotor:
         speed_told=is_bound(rig, SPEED),
         marked=is_bound(rig, ANGLE) and is_bound(rig, SPEED),
         clearance=least_clearance(rig),
+        pulsed=pulsed(rig),
     )

@@ -90,7 +90,7 @@ class Run:
 
 def captured_channels(machine: AmbRotor) -> tuple[str, ...]:
     """What is captured in a dwell of a balancing: no voltages."""
-    return (*machine.positions, *machine.currents, "pulses", "pulse_age")
+    return (*machine.positions, *machine.currents, *machine.pulsed)
 
 
 def read_capture(data: CaptureData, machine: AmbRotor, slow: bool = False) -> Read:
@@ -100,8 +100,9 @@ def read_capture(data: CaptureData, machine: AmbRotor, slow: bool = False) -> Re
         AnalysisError: too few pulses or turns.
     """
     c: Mapping[str, Array] = data.columns
-    t = np.arange(len(c["pulses"])) / data.rate_hz
-    tacho: Tachometer = tachometer(*counted(t, c["pulses"], c["pulse_age"]))
+    count, age = (c[name] for name in machine.pulsed)
+    t = np.arange(len(count)) / data.rate_hz
+    tacho: Tachometer = tachometer(*counted(t, count, age))
     wide = np.array([c[n] for n in (*machine.positions, *machine.currents)])
     track = synchronous(t, wide, tacho, Sampling(1 / data.rate_hz))
     return Read(float(track.speed[0]), np.asarray(track.means[0]), track.vectors(0, range(12)), tacho.sound,

@@ -19,6 +19,7 @@ from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
+from bench.rigfile.recorded import AGE, COUNT
 from bench.uncertainty import Estimate
 from bench.units import RPM
 from procedures.amb_rotor import lift, pushes
@@ -156,10 +157,11 @@ def figures(found: Compared, recording: Recording[Plan]) -> Iterable[Shown]:
 
 def requires(rig: RigFile) -> Requires:
     """What the unbalance response needs, and a controller that compensates."""
-    needed = unbalance.requires(rig)
+    needed, machine = unbalance.requires(rig), conventions(rig)
     return replace(
-        needed, capabilities=(*needed.capabilities, "settings.compensation.corrected", "settings.compensation.waiting")
-    )
+        needed, capabilities=(*needed.capabilities, "settings.compensation.corrected", "settings.compensation.waiting"),
+        capture=(*needed.capture, *machine.positions, *(machine.pulsed or (COUNT, AGE))),
+    )  # fmt: skip
 
 
 procedure = Procedure(

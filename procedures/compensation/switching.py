@@ -74,7 +74,7 @@ def switched(machine: AmbRotor) -> dict[str, float]:
 
 def captured_channels(machine: AmbRotor) -> tuple[str, ...]:
     """What is captured about the switch."""
-    return (*machine.positions, "pulses", "pulse_age")
+    return (*machine.positions, *machine.pulsed)
 
 
 def read_switch(recording: Recording[Any]) -> Switched:
@@ -93,7 +93,8 @@ def read_switch(recording: Recording[Any]) -> Switched:
         raise AnalysisError("found no write that switches the compensation within the step")
     data: Mapping[str, Array] = found[0].arrays(*captured_channels(machine))
     t = data["t_s"] - (written[0] - recording.start_ns) * 1e-9
-    tacho = tachometer(*counted(t, data["pulses"], data["pulse_age"]))
+    count, age = (data[name] for name in machine.pulsed)
+    tacho = tachometer(*counted(t, count, age))
     positions = np.array([data[p] for p in machine.positions])
     return Switched(t, positions, tacho, found[0].rate_hz, float(np.nanmedian(tacho.speed(t))), machine.axes)
 

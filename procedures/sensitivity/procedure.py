@@ -23,6 +23,7 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.capture import Layout
+from bench.rigfile.recorded import AGE, COUNT
 from procedures.amb_rotor import lift, pushes, wiring
 from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.laws import of_laws
@@ -37,7 +38,6 @@ from procedures.sensitivity.steps import (
     INJECT,
     LOOP,
     MODE,
-    PULSED,
     REFINED,
     SCAN,
     SURVEY,
@@ -191,7 +191,7 @@ def _take(
         return None
     t = data.start_ns * 1e-9 + np.arange(len(data.columns["inject"])) / data.rate_hz
     try:
-        return sensitivity(data.columns, t, data.rate_hz, grid)[0]
+        return sensitivity(data.columns, t, data.rate_hz, grid, conventions(rig.file).pulsed)[0]
     except AnalysisError:
         return None  # which the analysis tells
 
@@ -237,7 +237,11 @@ def requires(rig: RigFile) -> Requires:
         lacks=(*machine.stations.lacks, *moves),
         channels=telemetry_channels(machine),
         capabilities=("set_points", "injection"),
-        capture=(*LOOP, *(PULSED if machine.marked else ()), *machine.all_currents),
+        capture=(
+            *LOOP,
+            *((machine.pulsed or (COUNT, AGE)) if machine.marked else ()),
+            *machine.all_currents,
+        ),
         uses=("settings.law", "settings.lift", "injection.lines", "injection.step", "mark"),
     )
 

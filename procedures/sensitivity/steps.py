@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,7 +24,6 @@ Complex = npt.NDArray[np.complex128]
 INJECT, NOT_REACHED = "inject", "not-reached"
 WIRING, SURVEY, SCAN, MODE, REFINED, HALF = "wiring", "survey", "scan", "mode", "refined", "half"
 LOOP = ("inject", "before", "after")
-PULSED = ("pulses", "pulse_age")
 ORDERS = (1.0, 2.0, 3.0, 4.0)
 CLEAR_HZ = 3.0  # to either side of an order of the shaft's speed
 WHOLE = 1e-6  # of the samples of a period: how far they may be from a whole number
@@ -124,7 +123,7 @@ def _axial(machine: AmbRotor) -> tuple[str, ...]:
 
 def captured_channels(machine: AmbRotor, kind: str, speed: float) -> tuple[str, ...]:
     """What is captured: first of all also the coil currents, which tell where the injection goes."""
-    return (*LOOP, *(machine.all_currents if kind == WIRING else ()), *(PULSED if speed else ()))
+    return (*LOOP, *(machine.all_currents if kind == WIRING else ()), *(machine.pulsed if speed else ()))
 
 
 def folds(grid: Grid, rate: float) -> bool:
@@ -133,16 +132,19 @@ def folds(grid: Grid, rate: float) -> bool:
     return bool(grid.hz.max() > 0.45 * rate or abs(samples - round(samples)) > WHOLE * samples)
 
 
-def sensitivity(columns: Mapping[str, Array], t: Array, rate: float, grid: Grid) -> tuple[Response, Array, Array]:
-    """S at the lines, the amplitudes found there (m,) A, and the excluded lines; with pulses the shaft's orders are taken out.
+def sensitivity(
+    columns: Mapping[str, Array], t: Array, rate: float, grid: Grid, pulsed: Sequence[str]
+) -> tuple[Response, Array, Array]:
+    """S at the lines, the amplitudes found there (m,) A, and the excluded lines; with the channels `pulsed` the shaft's orders
+    are taken out.
 
     Raises:
         AnalysisError: fewer than three periods, or a line without injection.
     """
     data = np.array([columns["inject"], columns["after"]])
     hz, near = grid.hz, grid.hz[:0]
-    if "pulses" in columns:
-        angle, speed, inside = track_angle(columns, t)
+    if is_pulsed(columns, pulsed):
+        angle, speed, inside = track_angle(columns, t, pulsed)
         data = np.concatenate([data[:1, inside], without_orders(data[1:, inside], angle[inside], ORDERS)])
         free = clear_of_orders(hz, speed, CLEAR_HZ, ORDERS)
         hz, near = hz[free], hz[~free]
@@ -150,9 +152,17 @@ def sensitivity(columns: Mapping[str, Array], t: Array, rate: float, grid: Grid)
     return response(found, 1, 0), np.abs(found.values[:, 0]).mean(axis=0), near
 
 
-def track_angle(columns: Mapping[str, Array], t: Array) -> tuple[Array, float, npt.NDArray[np.bool_]]:
+def is_pulsed(columns: Mapping[str, Array], pulsed: Sequence[str]) -> bool:
+    """Whether a capture has the mark's pulses."""
+    return bool(pulsed) and all(name in columns for name in pulsed)
+
+
+def track_angle(
+    columns: Mapping[str, Array], t: Array, pulsed: Sequence[str]
+) -> tuple[Array, float, npt.NDArray[np.bool_]]:
     """Angle (n,) rad by the pulses, mean speed rad/s, and where the angle is known, (n,)."""
-    tacho = tachometer(*counted(t, columns["pulses"], columns["pulse_age"]))
+    count, age = (columns[name] for name in pulsed)
+    tacho = tachometer(*counted(t, count, age))
     angle = tacho.angle(t)
     inside = np.isfinite(angle)
     if inside.sum() < 2:
@@ -187,10 +197,11 @@ def _read(recording: Recording[Any], step: Step) -> Taken:
         raise AnalysisError(f"injection {dict(labels)}: found no capture")
     kind, grid, rate = str(labels["pass"]), grid_of(labels), captured[0].rate_hz
     columns = captured[0].arrays(*captured[0].channels)
-    found, injected, excluded = sensitivity(columns, columns["t_s"], rate, grid)
+    found, injected, excluded = sensitivity(columns, columns["t_s"], rate, grid, machine.pulsed)
     clipped = float(np.abs(columns["after"] - columns["before"] - columns["inject"]).max())
     follows = _follows(columns, machine, rate, grid) if kind == WIRING else None
-    turning = track_angle(columns, columns["t_s"])[1] if "pulses" in columns else 0.0
+    turns = is_pulsed(columns, machine.pulsed)
+    turning = track_angle(columns, columns["t_s"], machine.pulsed)[1] if turns else 0.0
     flags = int(np.bitwise_or.reduce(data[STATUS].astype(np.int64)))
     return Taken(
         str(labels["axis"]), float(labels["speed_rad_s"]), turning, kind, float(labels["about_hz"]), grid, found, excluded,

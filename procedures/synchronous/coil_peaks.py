@@ -19,7 +19,7 @@ from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
 from procedures.amb_rotor.conventions import conventions
 from procedures.shared.certificates import certified
-from procedures.synchronous.dwells import Dwell, Full
+from procedures.synchronous.dwells import Dwell, Full, can_capture
 
 Array = npt.NDArray[np.float64]
 SHARE = 0.01  # of the time
@@ -60,7 +60,8 @@ def blocks(full: Full) -> npt.NDArray[np.intp]:
 
 def peaks(d: Dwell, inputs: Mapping[str, Estimate], plane: str, rig: RigFile) -> dict[tuple[str, str], Estimate]:
     """Current and voltage of the plane's coil that needs most, with gain, zero, resolution, and the scatter over the turns;
-    nothing without a capture."""
+    nothing without a capture, no voltage
+    where none is captured."""
     if d.full is None:
         return {}
     first, edges = 2 * d.machine.planes[plane][0], blocks(d.full)
@@ -75,6 +76,9 @@ def peaks(d: Dwell, inputs: Mapping[str, Estimate], plane: str, rig: RigFile) ->
     where = f"{d.where}/{plane}"
     current = _scattered(seen, f"current/{where}", "A") + _noise(d.full.currents[k], where)
     current = (current + _resolution(rig, d.machine.currents[k], where) - inputs[f"i_zero_{k}"]) / inputs[f"i_gain_{k}"]
+    peak = {("current_peak", plane): replace(current, unit="A")}
+    if not d.full.voltages.size:  # the controller captures none
+        return peak
     j, seen = greatest(d.full.voltages)
     name = d.machine.voltages[j]
     voltage = _scattered(seen, f"voltage/{where}", "V") + _resolution(rig, name, where)
@@ -84,17 +88,21 @@ def peaks(d: Dwell, inputs: Mapping[str, Estimate], plane: str, rig: RigFile) ->
             for what, t in (("offset", sensor.offset), ("gain", sensor.gain))
         )
         voltage = (voltage - seen.sign * zero) / gain
-    return {("current_peak", plane): replace(current, unit="A"), ("voltage_peak", plane): replace(voltage, unit="V")}
+    return {**peak, ("voltage_peak", plane): replace(voltage, unit="V")}
 
 
 def find_uncertified(rig: RigFile) -> Iterator[Finding]:
-    """Whether the voltages are no more than what the amplifiers say."""
+    """Whether the voltages are no more than what the amplifiers say, or not captured at all."""
     missing = [name for name in conventions(rig).voltages if name not in rig.sensors]
     if missing:
         text = (
             f"no certificates of {', '.join(missing)}: voltages are as the amplifiers read them, without gain and zero"
         )
         yield Finding("voltage-not-certified", text)
+    if can_capture(rig) and not conventions(rig).voltages:
+        text = ("captures have no coil voltages: what the coils need of the amplifiers' voltage is not stated. Bind "
+                "`voltages` of each bearing's axes, and name these channels in [capture.channels], to have it.")  # fmt: skip
+        yield Finding("voltage-not-captured", text)
 
 
 def _scattered(seen: Exceeded, identity: str, unit: str) -> Estimate:

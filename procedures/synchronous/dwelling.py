@@ -10,7 +10,7 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from procedures.amb_rotor import lift
 from procedures.amb_rotor.conventions import Law, Variant, conventions
-from procedures.synchronous.dwells import SLOW, TELLS, can_capture, telemetry_period_s
+from procedures.synchronous.dwells import SLOW, TELLS, can_capture, telemetry_period_s, uncapturable
 
 
 def roll_slowly(rig: Rig, record: Recorder, law: Law, rad_s: float, seconds: float, settle_s: float) -> bool:
@@ -38,9 +38,10 @@ def uncaptured(rig: RigFile) -> Iterator[Finding]:
     """What is not stated where the controller records nothing at its full rate."""
     if not can_capture(rig):
         hz = TELLS / telemetry_period_s(rig)
-        text = (f"the controller captures nothing of the turning shaft: nothing is stated above {hz:.0f} Hz, {TELLS:g} of its "
-                "telemetry's rate; no spectra, no needs of the coils, and D_max without motion that does not turn with the "
-                "shaft.")  # fmt: skip
+        which = f" ([capture.channels] has no {', '.join(uncapturable(rig))})" if rig.capture is not None else ""
+        text = (f"the controller captures nothing of the turning shaft{which}: nothing is stated above {hz:.0f} Hz, "
+                f"{TELLS:g} of its telemetry's rate; no spectra, no needs of the coils, and D_max without motion that does not "
+                "turn with the shaft.")  # fmt: skip
         yield Finding("telemetry-alone", text)
 
 

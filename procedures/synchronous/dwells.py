@@ -19,6 +19,7 @@ from bench.errors import AnalysisError
 from bench.procedure.requires import Requires
 from bench.recording import Captured, Recording, Step
 from bench.rigfile import RigFile
+from bench.rigfile.recorded import unrecorded
 from bench.rigfile.roles import STATUS
 from bench.units import RPM
 from procedures.amb_rotor.conventions import AmbRotor, conventions
@@ -35,7 +36,8 @@ TELLS = 0.4  # of the telemetry's rate: what is above is not stated
 
 @dataclass(frozen=True)
 class Full:
-    """A capture: times `t` (n,) s, positions (4, n) m, currents and voltages (8, n), its `rate` Hz and pulses; `trigger_s`."""
+    """A capture: times `t` (n,) s, positions (4, n) m, currents and voltages (8, n) (0, where none are captured), its `rate` Hz
+    and pulses; `trigger_s`."""
 
     t: Array
     positions: Array
@@ -106,7 +108,7 @@ def telemetry_channels(rig: RigFile) -> tuple[str, ...]:
 
 def captured_channels(machine: AmbRotor) -> tuple[str, ...]:
     """What is captured in a dwell."""
-    return (*machine.positions, *machine.currents, *machine.voltages, "pulses", "pulse_age")
+    return (*machine.positions, *machine.currents, *machine.voltages, *machine.pulsed)
 
 
 def telemetry_period_s(rig: RigFile) -> float:
@@ -116,7 +118,14 @@ def telemetry_period_s(rig: RigFile) -> float:
 
 def can_capture(rig: RigFile) -> bool:
     """Whether the controller records at its full rate what orbits, spectra and the coils' needs are read of."""
-    return rig.capture is not None and set(captured_channels(conventions(rig))) <= set(rig.capture.channels)
+    return rig.capture is not None and not uncapturable(rig)
+
+
+def uncapturable(rig: RigFile) -> tuple[str, ...]:
+    """What a controller that captures would have to record besides; coil voltages are done without."""
+    known, machine = rig.capture.channels if rig.capture is not None else {}, conventions(rig)
+    needed = (name for name in (*machine.positions, *machine.currents) if name not in known)
+    return (*needed, *unrecorded(rig))
 
 
 def required(rig: RigFile) -> Requires:
@@ -190,7 +199,8 @@ def full_rate(captured: Captured, machine: AmbRotor) -> Full:
     """
     data: Mapping[str, Array] = captured.arrays(*captured_channels(machine))
     t = data["t_s"]
-    tacho = tachometer(*counted(t, data["pulses"], data["pulse_age"]))
+    count, age = (data[name] for name in machine.pulsed)
+    tacho = tachometer(*counted(t, count, age))
     kinds = (machine.positions, machine.currents, machine.voltages)
     three = [np.array([data[c] for c in names]) for names in kinds]
     return Full(t, three[0], three[1], three[2], captured.rate_hz, tacho)

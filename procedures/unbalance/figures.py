@@ -44,7 +44,8 @@ def all_figures(results: Results, rig: RigFile) -> Iterator[Shown]:
                 yield spectrum(shown, plane)
     if any(r.dwell.full is not None for r in results.dwells):
         yield _use(results, "current_peak", "A", "current")
-        yield _use(results, "voltage_peak", "V", "voltage")
+        if results.machine.voltages:
+            yield _use(results, "voltage_peak", "V", "voltage")
 
 
 def outlook(rig: RigFile) -> pictures.Outlook:

@@ -134,8 +134,10 @@ def figures(results: Results, recording: Recording[Plan]) -> Iterable[Shown]:
 
 
 def of_captures(rig: RigFile) -> tuple[Quantity, ...]:
-    """What a rig cannot show whose controller captures nothing."""
-    return () if can_capture(rig) else OF_CAPTURES
+    """What a rig cannot show whose controller captures nothing, or no coil voltages."""
+    if not can_capture(rig):
+        return OF_CAPTURES
+    return () if conventions(rig).voltages else (VOLTAGE,)
 
 
 procedure = Procedure(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,10 +36,11 @@ class CaptureMemory:
     Args:
         spec: what the rig file says of it.
         names: the channels of the readings that it is given, in their order.
+        told_by: which of them tell what the triggers of the mark wait for, by trigger.
     """
 
-    def __init__(self, spec: CaptureSpec, names: Sequence[str]) -> None:
-        self._spec = spec
+    def __init__(self, spec: CaptureSpec, names: Sequence[str], told_by: Mapping[str, str] = TOLD_BY) -> None:
+        self._spec, self._told_by = spec, told_by
         self._columns = {name: k for k, name in enumerate(names)}
         self._by_index = {c.index: name for name, c in spec.channels.items()}
         self.state = "IDLE"
@@ -66,7 +67,9 @@ class CaptureMemory:
         """Begin; the name of the status. What was recorded before is gone."""
         known = sum(1 << index for index in self._by_index)
         watched = (
-            self._by_index.get(order.source) if order.trigger in ("RISES", "FALLS") else TOLD_BY.get(order.trigger)
+            self._by_index.get(order.source)
+            if order.trigger in ("RISES", "FALLS")
+            else self._told_by.get(order.trigger)
         )
         if self.every:
             return "WRONG_STATE"
@@ -79,6 +82,8 @@ class CaptureMemory:
         if order.trigger not in ("NOW", "RISES", "FALLS", "PULSE", "SPEED"):
             return "OUT_OF_RANGE"
         names = [name for index, name in self._by_index.items() if order.mask >> index & 1]
+        if any(name not in self._columns for name in names):  # the rig file has it, this machine does not
+            return "UNKNOWN_CHANNEL"
         layout = Layout.of(self._spec, names)
         if order.length * layout.sample.itemsize > self._spec.memory_bytes:
             return "TOO_LARGE"

@@ -15,7 +15,7 @@ from bench.rigfile.messages import MessageMap
 from bench.wire.captureblock import block, pieces
 from bench.wire.isotp import FrameLength, Sender, TransferError
 from bench.wire.packet import LIMIT, MESSAGE, PAYLOAD_LIMIT
-from sim_backend.controller.capture_memory import CaptureMemory, Order
+from sim_backend.controller.capture_memory import TOLD_BY, CaptureMemory, Order
 from sim_backend.controller.ownership import Ownership
 
 BAUDRATE = 3_000_000  # of a serial port that does not say
@@ -36,7 +36,7 @@ class CapturePort:
 
     def __init__(self, rig: RigFile, messages: MessageMap, names: Sequence[str], tick_s: float) -> None:
         assert rig.capture is not None
-        self.memory = CaptureMemory(rig.capture, names)
+        self.memory = CaptureMemory(rig.capture, names, told_by(rig, names))
         self._tick_ns = round(tick_s * 1e9)
         self._capacity = rig.capture.memory_bytes
         self._map = messages
@@ -142,6 +142,12 @@ class CapturePort:
             "memory": self._capacity, "size": m.size, "samples": m.samples, "trigger": m.order.before,
             "tick": m.first_tick & 0xFFFFFFFF, "crc": m.crc,
         })  # fmt: skip
+
+
+def told_by(rig: RigFile, names: Sequence[str]) -> dict[str, str]:
+    """Which readings tell a pulse and a speed: those of the rig file's mark, else the controller's own."""
+    bound = {trigger: str(getattr(rig.mark, key)) if rig.mark is not None else "" for trigger, key in TOLD_BY.items()}
+    return {trigger: name if name in names else TOLD_BY[trigger] for trigger, name in bound.items()}
 
 
 def _can_ns(rig: RigFile) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from bench.rigfile import RigFile
@@ -10,6 +10,7 @@ from sim_backend.machines.twin.layout import Numbers, layout_of
 
 POSITION, PLUS, MINUS, VOLTS_PLUS, VOLTS_MINUS, PEAK = 0, 16, 32, 48, 64, 80
 ANGLE, SPEED, PULSES, EDGE, AGE, INJECT, BEFORE, AFTER, CONTACT, AXIAL_CONTACT = (*range(96, 105), 112)
+OF_MARK = (("angle", ANGLE), ("speed", SPEED), ("pulses", PULSES), ("edge", EDGE))
 NOTHING = 116  # always 0
 LIMITS = {"status.current_limit": 113, "status.voltage_limit": 114, "status.sensor_range": 115}
 Column = tuple[str, int]
@@ -35,10 +36,11 @@ def told_of(rig: RigFile, defects: Numbers) -> Told:
     told = [*_positions(rig, defects), *_coils(rig, defects), *_voltages(rig)]
     angle = list(_mark(rig))
     inner = [("inject", INJECT), ("before", BEFORE), ("after", AFTER)]
+    captured = (*told, *angle, *_inside(rig, [*told, *angle]), *inner)
     rows = [*told, *_peaks(rig), *angle, *inner, *_status(rig, bool(defects.get("contact_silent")))]
     return Told(
         axes=tuple(a.name for a in layout.axes), bearings=tuple(rig.bearings),
-        of_bearing=tuple(a.bearing for a in layout.axes), rows=tuple(rows), ticks=(*told, *angle, *inner),
+        of_bearing=tuple(a.bearing for a in layout.axes), rows=tuple(rows), ticks=captured,
         marked=rig.mark is not None, radial_columns=len(layout.looking),
     )  # fmt: skip
 
@@ -71,10 +73,16 @@ def _peaks(rig: RigFile) -> Iterator[Column]:
 def _mark(rig: RigFile) -> Iterator[Column]:
     if rig.mark is None:
         return
-    for name, place in (("angle", ANGLE), ("speed", SPEED), ("pulses", PULSES), ("edge", EDGE)):
+    for name, place in OF_MARK:
         if channel := getattr(rig.mark, name):
             yield channel, place
     yield "pulse_age", AGE
+
+
+def _inside(rig: RigFile, told: Iterable[Column]) -> Iterator[Column]:
+    """What the controller knows of the mark inside, by its own names: a capture has it whatever the telemetry calls it."""
+    known = {name for name, _ in told}
+    yield from ((name, place) for name, place in OF_MARK if rig.mark is not None and name not in known)
 
 
 def _status(rig: RigFile, silent: bool) -> Iterator[Column]:
