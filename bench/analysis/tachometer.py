@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from bench.analysis.evened import evened
 from bench.analysis.pulses import repaired
 from bench.analysis.sampling import Array, increasing
 from bench.errors import AnalysisError
@@ -65,8 +66,9 @@ class Tachometer:
         return np.asarray(self._time(angle, extrapolate=False))
 
 
-def tachometer(times: npt.ArrayLike, numbers: npt.ArrayLike | None = None) -> Tachometer:
-    """From pulse times (m,) s; `numbers` (m,) counts the pulses where some were not recorded (lost samples).
+def tachometer(times: npt.ArrayLike, numbers: npt.ArrayLike | None = None, step_s: float = 0.0) -> Tachometer:
+    """From pulse times (m,) s; `numbers` (m,) counts the pulses where some were not recorded (lost samples). Times that are
+    told in steps of `step_s` are evened out where a turn is short beside that.
 
     Pulses that are missing or doubled are found by their spacing, named by their times, and mended as far as that is
     certain. Every second pulse missing, or one more in the middle of every turn, looks like another speed: see `against`.
@@ -81,7 +83,7 @@ def tachometer(times: npt.ArrayLike, numbers: npt.ArrayLike | None = None) -> Ta
     if n.shape != t.shape or not (np.diff(n) > 0).all():
         raise AnalysisError("pulses: found numbers that do not increase with the times")
     kept, turns, missing, doubled = repaired(t, n)
-    return Tachometer(t[kept], turns, tuple(missing), tuple(doubled))
+    return Tachometer(evened(t[kept], turns, step_s), turns, tuple(missing), tuple(doubled))
 
 
 def against(tacho: Tachometer, speed: float, tolerance: float = 0.1) -> str:

@@ -44,7 +44,8 @@ def tachometer_of(rig: RigFile, t: Array, data: Mapping[str, Array]) -> Tachomet
     if by_angle(rig):  # as it was when the last reading was made, a tick before the sample's time
         tick = rig.devices["controller"].tick_s
         return tachometer(*counted(t - tick, data[PULSES], age(data[ANGLE], data[SPEED])))
-    return tachometer(*counted(t, data[PULSES], data[AGE], round(wraps_at(rig, resolved(rig, [PULSES])[0]))))
+    pulses = counted(t, data[PULSES], data[AGE], round(wraps_at(rig, resolved(rig, [PULSES])[0])))
+    return tachometer(*pulses, resolution_s(rig))
 
 
 def angle_u(rig: RigFile, rad_s: float) -> float:

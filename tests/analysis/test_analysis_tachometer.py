@@ -142,3 +142,35 @@ def test_refusals() -> None:
         tachometer([0.0, 2.0, 1.0, 3.0])
     with pytest.raises(AnalysisError, match="runs backwards"):
         counted(np.arange(5.0), [5, 6, 2, 3, 4], np.zeros(5))
+
+
+def _coarse_ramp(step_s: float) -> tuple[np.ndarray, np.ndarray]:
+    """Pulses of a shaft that speeds up from 800 rad/s at 25 rad/s^2, told in steps of `step_s`, and their numbers."""
+    pulses = Shaft(800.0, 25.0).pulses(4.0)
+    return np.round(pulses / step_s) * step_s, np.arange(pulses.size)
+
+
+def test_coarse_times_do_not_show_as_another_acceleration() -> None:
+    """10 us are 0.14 % of a turn of 7 ms: from pulses as they are told the speed changes by three times what it does."""
+    times, numbers = _coarse_ramp(1e-5)
+    t = np.arange(0.2, 3.8, 1e-3)
+
+    def slopes(step_s: float) -> np.ndarray:
+        return np.gradient(tachometer(times, numbers, step_s).speed(t), t)
+
+    assert np.mean(np.abs(slopes(0.0))) > 50
+    assert np.mean(np.abs(slopes(1e-5))) == pytest.approx(25.0, abs=5.0)
+    found = tachometer(times, numbers, 1e-5)
+    assert np.allclose(found.speed(t), 800 + 25 * t, atol=0.3)
+    assert np.allclose(
+        found.angle(t) - found.angle(t)[0], Shaft(800.0, 25.0).angle(t) - Shaft(800.0, 25.0).angle(t)[0], atol=6e-3
+    )
+
+
+def test_fine_times_and_long_turns_stay_as_they_are() -> None:
+    times, numbers = _coarse_ramp(1e-6)
+    assert np.array_equal(tachometer(times, numbers, 1e-6).times, times)
+    slow = np.round(Shaft(25.0, 0.0).pulses(4.0) / 1e-5) * 1e-5
+    assert np.array_equal(tachometer(slow, None, 1e-5).times, slow)
+    gaps = np.delete(numbers, slice(40, 400))
+    assert np.abs(tachometer(times[gaps], gaps, 1e-5).times - times[gaps]).max() < 1e-5
