@@ -47,4 +47,6 @@ def evened(times: Array, turns: Integers, step_s: float) -> Array:
 def _odd(share: float, most: int) -> int:
     """Pulses of a parabola, an odd number, for steps of so much of a turn."""
     wanted = min(math.ceil((share / EVEN) ** (2 / 3)), MOST, most)
-    return wanted if wanted % 2 else wanted - 1 if wanted == most else wanted + 1
+    if wanted % 2:
+        return int(wanted)
+    return int(wanted) - 1 if wanted == most else int(wanted) + 1
