@@ -8,7 +8,9 @@ from collections.abc import Iterable, Iterator
 from bench.findings import Finding
 from bench.rigfile import RigFile
 from bench.rigfile.places import PlaceError, Places
-from procedures.amb_rotor.conventions import conventions
+from procedures.amb_rotor.conventions import AmbRotor, conventions
+
+SQUARE = math.sin(math.radians(1.0))  # of a cosine: axes that are so near to right angles are meant to be
 
 
 def describe(rig: RigFile, coordinates: Iterable[str]) -> Iterator[Finding]:
@@ -18,8 +20,15 @@ def describe(rig: RigFile, coordinates: Iterable[str]) -> Iterator[Finding]:
     if all(axis.startswith(c) for c, axes in along.items() for axis in axes):
         return
     zero = f" from {shaft.zero_at}" if shaft is not None and shaft.zero_at else ""
-    told = [f"{c} is along {' and '.join(axes)}{_angle(rig, axes[0], zero)}" for c, axes in along.items()]
+    told = [f"{c} is {_way(machine, c)}{' and '.join(axes)}{_angle(rig, axes[0], zero)}" for c, axes in along.items()]
     yield Finding("coordinates", f"{'; '.join(told)}. Radial ones are told at the centre of mass.", "")
+
+
+def _way(machine: AmbRotor, coordinate: str) -> str:
+    """How a coordinate lies to the axes that are nearest to it: y is along the first, z across y."""
+    if coordinate != "z" or all(abs(machine.stations.share("y", axis)) < SQUARE for axis in machine.along("z")):
+        return "along "
+    return "across y, to the side of "
 
 
 def _angle(rig: RigFile, axis: str, zero: str) -> str:

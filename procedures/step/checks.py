@@ -207,7 +207,7 @@ def _came(steps: Sequence[Done]) -> Iterator[Finding]:
 
 
 def of_results(
-    results: Mapping[Case, Result], groups: Mapping[str, Mapping[str, Estimate]], plan: Plan
+    results: Mapping[Case, Result], groups: Mapping[str, Mapping[str, Estimate]], plan: Plan, *, leaning: bool = False
 ) -> Iterator[Finding]:
     """Steps that do not settle, bands that noise has widened, responses without an oscillation."""
     for case, result in results.items():
@@ -225,7 +225,14 @@ def of_results(
                                           f"step; the settling "
                           f"time is that into this band, not into {plan.band:.1%}.", case.where)  # fmt: skip
     for where, estimates in groups.items():
-        if "damping" not in estimates:
+        if leaning and ", x, " not in where:
+            text = (
+                "the axes of a bearing are not at right angles and each has a control of its own: a step along y or z swings "
+                "along both, with two oscillations that lie far apart. One is what would be fitted: overshoot, settling, "
+                "bandwidth, damping and frequency are not told; rise and error are."
+            )
+            yield Finding("axes-coupled", text, where)
+        elif "damping" not in estimates:
             yield Finding("no-oscillation", "no oscillation that dies away fits the response: damping and frequency are not "
                           "told.", where)  # fmt: skip
 

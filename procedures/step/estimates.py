@@ -20,7 +20,7 @@ from procedures.step import steps as step_steps
 from procedures.step.coupled import Tilting
 from procedures.step.fit import swing
 from procedures.step.oscillation import One, Swing
-from procedures.step.position import shares, tilting_of
+from procedures.step.position import leans, shares, tilting_of
 from procedures.step.scatter import jackknifed, left_out, pooled, repeated, weighed
 from procedures.step.settling import Curve, Settling
 from procedures.step.steps import Case, Done
@@ -63,7 +63,7 @@ def by_case(steps: list[Done], rig: RigFile, band: float) -> dict[Case, Result]:
     """
     done, tilting = step_steps.by_case(steps), tilting_of(rig)
     ones = {case: tuple(_one(d) for d in d_all) for case, d_all in done.items()}
-    fits = {case: _fits(o, tilting) for case, o in ones.items()}
+    fits = {case: [] if leans(rig, case.axis) else _fits(o, tilting) for case, o in ones.items()}
     seen = {
         "rise_time": repeated("s", 1, ones, _rise),
         "steady_error": repeated("m", 0, ones, lambda case, o: case.way * case.size * (_late(o) - 1)),
@@ -75,7 +75,7 @@ def by_case(steps: list[Done], rig: RigFile, band: float) -> dict[Case, Result]:
     for case, all_of in done.items():
         settled = settling.settling(curves[case.group], case, all_of, band)
         found = {name: pooled(name, case, s) for name, s in seen.items() if case in s.values}
-        if math.isfinite(settled.time):
+        if math.isfinite(settled.time) and not leans(rig, case.axis):
             found["settling_time"] = settling_estimate(case, settled)
             if (lag := lag_estimate(rig)) is not None:
                 found["settling_time"] += lag
@@ -192,6 +192,8 @@ def _oscillation(group: str, results: Sequence[Result], rig: RigFile) -> dict[st
     one step after the other, among those of its kind. Nothing where there is no oscillation.
 
     What is taken for granted of a second oscillation beside what fades fast moves both (`coupled`)."""
+    if any(leans(rig, r.case.axis) for r in results):
+        return {}
     ones, tilting = [o for r in results for o in r.ones], tilting_of(rig)
     kinds, n = [(r.case, o.begin) for r in results for o in r.ones], len(ones)
     try:

@@ -28,7 +28,7 @@ from procedures.step import capturing, checks, estimates, hum, planes, slewing
 from procedures.step import figures as drawn
 from procedures.step.estimates import Result
 from procedures.step.plan import Plan
-from procedures.step.position import is_plain
+from procedures.step.position import is_plain, leans
 from procedures.step.record_length import enough_s, faded_s
 from procedures.step.steps import STEP, TURNING_RAD_S, Case, Done, cases, channels, read_steps
 
@@ -52,6 +52,7 @@ WAY = Quantity(
 )
 MEASURES = (OVERSHOOT, RISE, SETTLING, ERROR, BANDWIDTH, DAMPING, FREQUENCY, SIZE, WAY)
 SETTLED_S = 0.5  # after the last ramp of a speed
+COUPLED = (OVERSHOOT, SETTLING, BANDWIDTH, DAMPING, FREQUENCY, SIZE, WAY)  # untold where y and z share two oscillations
 MARGIN = 0.8  # of the clearance that a step with its overshoot may use
 
 
@@ -180,7 +181,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     by_case = estimates.by_case(steps, recording.rig, plan.band)
     by_group = estimates.by_group(steps, by_case, recording.rig)
     findings.add(frame.describe(recording.rig, plan.axes))
-    findings.add(checks.of_results(by_case, by_group, plan))
+    findings.add(checks.of_results(by_case, by_group, plan, leaning=leans(recording.rig)))
     findings.add(slewing.of_sizes(by_case))
     findings.add(hum.find_hum(steps, by_case))
     findings.add(checks.compare(by_case, plan.names))
@@ -266,6 +267,7 @@ procedure = Procedure(
     name="step",
     title="Set-point steps of the levitated shaft",
     measures=MEASURES,
+    untold=lambda rig: COUPLED if leans(rig) else (),
     optional=(SETTLING,),  # what does not settle is a finding
     state=RigState.LEVITATED,
     plan=Plan,

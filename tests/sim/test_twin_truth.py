@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import math
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -9,6 +11,10 @@ import numpy as np
 import pytest
 
 from bench.rigfile import RigFile, load_rig
+from procedures.amb_rotor.conventions import conventions
+from procedures.amb_rotor.frame import describe
+from procedures.step.position import leans, shares
+from procedures.step.procedure import procedure
 from sim_backend.machines.twin import truth_sensitivity, truth_whirl
 from sim_backend.machines.twin.quiet import Sight, floating
 from sim_backend.machines.twin.truth_step import steps_asked
@@ -47,6 +53,29 @@ def test_small_steps_swing_as_the_slowest_mode_of_the_linear_model() -> None:
     up, down = shown[1e-5, 1], shown[1e-5, -1]
     assert up.overshoot == pytest.approx(down.overshoot, rel=0.01)  # no weight across a shaft that stands
     assert up.y[-1] == pytest.approx(1.0, abs=1e-6)  # as read, by its integrators
+
+
+def test_axes_that_are_not_at_right_angles_have_z_across_y(tmp_path: Path) -> None:
+    """A step along z moves the second axis of each bearing by sin a, and the shaft by the whole of it across y."""
+    folder = EXAMPLES / "vertical-spindle"
+    for path in folder.glob("*.dbc"):
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    text = (folder / "spindle.toml").read_text(encoding="utf-8")
+    (tmp_path / "spindle.toml").write_text(text.replace("plus_deg = 90", "plus_deg = 60"), encoding="utf-8")
+    rig = load_rig(str(tmp_path / "spindle.toml"))
+    points = conventions(rig).point("z", 1.0)
+    assert sorted(points) == ["TargetLowerV", "TargetUpperV"]
+    assert [*points.values()] == pytest.approx([math.sin(math.radians(60))] * 2)
+    plan = dataclasses.replace(asked(rig, points), axis="z", record_s=2.5)
+    _, shown = steps_asked(rig, draw(rig, 1, {f"{c}.gain": 1.0 for c in shares(rig, "z")}), plan)
+    assert abs(shown[1e-5, 1].steady_error) < 2e-8  # along the second axis it would be 1.34 um short
+    assert shown[1e-5, 1].y[-1] == pytest.approx(1.0, abs=1e-3)
+    assert leans(rig)
+    assert not leans(rig, "x")
+    assert not leans(rig_of(SPINDLE))
+    told = procedure.on(rig).optional
+    assert {"overshoot", "damping", "natural_frequency"} <= {q.name for q in told}
+    assert next(iter(describe(rig, "yz"))).text.count("z is across y, to the side of LowV") == 1
 
 
 def test_what_probes_tell_of_a_step_is_off_by_their_gains() -> None:

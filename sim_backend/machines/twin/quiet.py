@@ -24,6 +24,7 @@ from sim_backend.machines.twin.told import told_of
 
 Array = npt.NDArray[np.float64]
 REST_S, MOST_S = 0.1, 60.0  # before the lift; that a lift may take
+STRAIGHT = 1e-9  # of a cosine: what rounding leaves of a right angle
 STIFF_S, STRONG_RAD_S2 = 50.0, 1e4  # of the drive that holds the speed, over the polar inertia: 1/s and rad/s^2
 
 
@@ -99,14 +100,15 @@ class Sight:
         rows = np.array(p.probe).reshape(8, 16)[:4].T[:many] @ basis
         self._read = basis @ back * signs[:many], signs[many:]
         self._true = basis @ np.linalg.pinv(rows, rcond=1e-6) / told[:many], 1 / told[many:]
-        self._ways = _ways(nominal), _ways(drawn)
+        square = _square(nominal)
+        self._ways = square @ _ways(nominal), square @ _ways(drawn)
         stations = [nominal.geometry.station(f"probes/{name}") for name in layout.looking]
         self.arm = (max(stations) - min(stations)) / 2
         self._sense = layout.sense
 
     def shaft(self, trace: Array, true: bool) -> Array:
-        """y, z and x of the centre of mass, along the axes of the bearing nearest to the near end, and what the tilts make at
-        half of the probes' distance, (5, n) m."""
+        """y, z and x of the centre of mass, y along the first axis of the bearing nearest to the near end and z across it, and
+        what the tilts make at half of the probes' distance, (5, n) m."""
         (radial, axial), way = (self._true if true else self._read), self._ways[true]
         q = radial @ trace[:, self.looking].T
         along = self._sense * axial @ trace[:, self.along].T / len(self.along) if self.along else np.zeros(len(trace))
@@ -124,8 +126,17 @@ class Sight:
         return np.array([y, z, -minus_psi, theta])
 
 
+def _square(columns: Columns) -> Array:
+    """(2, 2): y and z of displacements u and v along the first bearing's axes a apart, as these are meant to stand: y = u and
+    z = (v - u cos a)/|sin a|, to the side of the second axis. What the axes are off from there is in z as it is in readings
+    and set points of them."""
+    (c, s), (c2, s2) = _ways(columns)
+    lean, aside = c * c2 + s * s2, abs(c * s2 - s * c2)
+    return np.eye(2) if abs(lean) < STRAIGHT else np.array([[1.0, 0.0], [-lean / aside, 1 / aside]])
+
+
 def _ways(columns: Columns) -> Array:
-    """(2, 2): what a unit of y and z is along the first bearing's axes, or along one and a quarter turn on."""
+    """(2, 2): directions of the first bearing's axes, or of one and a quarter turn on."""
     from bench.rigfile.supports import radial_supports
 
     nearest = radial_supports(columns.rig)[0].name
