@@ -231,7 +231,7 @@ def of_results(
                 "along both, with two oscillations that lie far apart. One is what would be fitted: overshoot, settling, "
                 "bandwidth, damping and frequency are not told; rise and error are."
             )
-            yield Finding("axes-coupled", text, where)
+            yield Finding("axes-oblique", text, where)
         elif "damping" not in estimates:
             yield Finding("no-oscillation", "no oscillation that dies away fits the response: damping and frequency are not "
                           "told.", where)  # fmt: skip

@@ -65,7 +65,8 @@ def trailing(y: Array, samples: float) -> Array:
 
 
 def bandwidth(steps: Sequence[One], swing: Swing) -> float:
-    """Hz from where on the gain from set point to position is below 0.707, by the steps' mean; infinite beyond the scan."""
+    """Hz where the gain from set point to position first falls below 0.707, by the steps' mean; infinite beyond the scan. A
+    bending mode far above may lift it again: that is no band in which the shaft follows."""
     period = float(steps[0].t[1] - steps[0].t[0])
     count = round(LENGTH_S / period)
     turns = np.exp(-2j * np.pi * period * np.outer(SCAN_HZ, np.arange(count)))
@@ -77,8 +78,8 @@ def bandwidth(steps: Sequence[One], swing: Swing) -> float:
         y = np.where(t < RAW_S, np.append(raw, np.zeros(count - len(raw))), swing.means(t, period))
         gain += np.exp(-2j * np.pi * SCAN_HZ * t[0]) * (turns @ np.diff(y, prepend=y[0]))
     whole = np.abs(gain) / len(steps) / np.sinc(SCAN_HZ * period) ** 2
-    above = np.flatnonzero(whole >= math.sqrt(0.5))
-    if not len(above) or above[-1] + 1 >= len(SCAN_HZ):
+    falls = np.flatnonzero((whole[:-1] >= math.sqrt(0.5)) & (whole[1:] < math.sqrt(0.5)))
+    if not len(falls):
         return math.inf
-    k = int(above[-1])
+    k = int(falls[0])
     return float(np.interp(-math.sqrt(0.5), -whole[k : k + 2], SCAN_HZ[k : k + 2]))

@@ -24,6 +24,7 @@ BEGIN_S, LENGTH_S = 6e-4, 0.1  # of the record that it is made of
 SLOW_HZ, FAST_HZ, DAMPED = 15.0, 250.0, 0.95  # of the rigid modes: slower are integrators, faster filters and bending
 OF_ITS_OWN = 0.75  # of the pole that carries most: what lies farther from it is another oscillation
 SWING_S, BAND_S = 0.08, 0.25  # of the first swing; of the response that makes the bandwidth
+SCANNED = 40  # the first line of the response that is looked at: 20 Hz, where the procedure begins
 PHASES = 3  # of the revolution, at which steps begin: what goes with one or two a turn has no mean
 COORDINATES = "yzx"
 
@@ -68,11 +69,12 @@ class Shown:
 
     @property
     def bandwidth(self) -> float:
-        """Where the spectrum of the response's derivative falls below 0.707 for good, Hz."""
+        """Where the spectrum of the response's derivative first falls below 0.707, Hz: a bending mode may lift it again."""
         y = self.y[: round(BAND_S / self.tick_s)]
         count = round(1 / (0.5 * self.tick_s))  # zeros behind, for lines 0.5 Hz apart
         gain = np.abs(np.fft.rfft(np.diff(y, prepend=y[0]), count))[:1000]
-        last = int(np.flatnonzero(gain >= math.sqrt(0.5))[-1])
+        above = gain >= math.sqrt(0.5)
+        last = int(np.flatnonzero(above[SCANNED:-1] & ~above[SCANNED + 1 :])[0]) + SCANNED
         return 0.5 * float(np.interp(-math.sqrt(0.5), -gain[last : last + 2], [last, last + 1]))
 
     def settling_time(self, band: float, window_s: float) -> float:

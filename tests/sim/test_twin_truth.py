@@ -15,6 +15,7 @@ from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.frame import describe
 from procedures.step.position import leans, shares
 from procedures.step.procedure import procedure
+from sim_backend.machines.stepping import Shown
 from sim_backend.machines.twin import truth_sensitivity, truth_whirl
 from sim_backend.machines.twin.quiet import Sight, floating
 from sim_backend.machines.twin.truth_step import steps_asked
@@ -167,3 +168,14 @@ def test_a_shaft_that_turns_freely_is_stopped_by_the_drag_that_is_told() -> None
     level = told["T_c"] / told["B"]
     expected = (begin + level) * np.exp(-told["B"] / told["J_z"] * 2.0) - level
     assert begin - float(plant.state()["s"][11]) == pytest.approx(begin - expected, rel=1e-3)
+
+
+def test_a_bending_mode_far_above_is_no_bandwidth() -> None:
+    """A loop of 70 Hz with a mode that rings at 420 Hz: the gain falls below -3 dB, and is above it again there."""
+    t = np.arange(0, 0.5, 5e-5)
+    w, mode = 2 * np.pi * 70, 2 * np.pi * 420
+    swing = 1 - np.exp(-0.7 * w * t) * (np.cos(0.714 * w * t) + 0.98 * np.sin(0.714 * w * t))
+    rings = 0.2 * np.exp(-20 * t) * np.sin(mode * t)
+    alone, both = (Shown(t, y, 0.0, 5e-5).bandwidth for y in (swing, swing + rings))
+    assert alone == pytest.approx(70, rel=0.02)
+    assert both == pytest.approx(70, rel=0.1)
