@@ -148,8 +148,9 @@ class ConsoleOperator:
         degrees = math.degrees(way.angle_rad) % 360
         counts = f"{degrees:.0f}° from {way.zero}, counter-clockwise seen from outside the {way.end} end"
         done = self._confirmed(
-            f"{LANDED} It will be lifted once its probes are known to count the right way. Push it by hand at its middle "
-            f"{way.axis} ({counts}) until it touches its rings, and hold it there.",
+            f"{LANDED} It will be lifted once its probes are known to count the right way. Push it by hand midway "
+            f"between its rings {way.axis} ({counts}) until it touches them there, one that lies with about as much as it "
+            "weighs, and hold it there.",
             "it is held there", True, _Other("To leave it out, as it was shown before: type skip.", _skipped),
         )  # fmt: skip
         return done and (self._then is None or self._then.push(way))

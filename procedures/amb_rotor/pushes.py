@@ -6,6 +6,10 @@ pushes the shaft in a direction e of the rig file until it touches its rings, at
 reads c (a e), its sign with it: half of the clearance and more where a and e are less than 60 degrees apart. One push shows
 all probes that look about that way; one that shows at those across instead has exchanged axes.
 
+A shaft that lies is pushed with about as much as it weighs, and stands where push and weight together press it to each ring.
+That is not where it is pushed, the less so where it overhangs: then its rings carry more than it weighs, and one holds it down.
+So what a probe should read follows from that lever (`leaning`), and of both ways along a probe the one is asked for that shows.
+
 Where nobody can be asked nothing is shown, and a note says so (`polarity-not-shown`).
 """
 
@@ -24,15 +28,18 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.supports import least_clearance
-from procedures.amb_rotor import rings
+from procedures.amb_rotor import leaning, rings
 from procedures.amb_rotor.stations import Stations, stations
 from procedures.shared import first_look
 
 PUSH = "push"
-ABOUT = 0.7  # cosine: a push shows the polarity of probes that look less than 45 degrees from it
+ABOUT = 0.7  # of the clearance: a push shows the polarity of probes that read as much of it, by 45 degrees from it
+ENOUGH = 0.5  # of the clearance, that a probe should read of a push the way in which it grows; else it is pushed the other way
+TELLS = 0.3  # of the clearance: what moves a probe by less says nothing of it
 ACROSS = 0.3  # of a probe that it does not move
 SEEN = 0.3  # of the clearance, that a probe must read of a push
 HELD_S = 0.3
+ROUNDING = 1e-9
 ALIKE = math.cos(math.radians(1.0))
 
 
@@ -46,11 +53,12 @@ class Pushed:
 
 
 def wanted(rig: RigFile) -> tuple[Push, ...]:
-    """The pushes that show every probe of which gravity does not say which way it counts; none where it says it of all."""
+    """The pushes that show every probe of which gravity does not say which way it counts; none where it says it of all, and
+    none for a probe that no push along it moves."""
     s, out = stations(rig), list[Push]()
     for channel in rings.unshown(rig):
-        angle = _counts(s, channel)
-        if not any(abs(math.cos(angle - _from_y(s, p.angle_rad))) >= ABOUT for p in out):
+        angle = _way(rig, channel)
+        if not any(channel in _shown(rig, _from_y(s, p.angle_rad)) for p in out) and channel in _shown(rig, angle):
             around = s.first.value + s.hand * angle
             out.append(Push(_name(s, channel, angle), around, _zero(rig), _end(rig)))
     return tuple(out)
@@ -87,12 +95,11 @@ def recorded(recording: Recording[Any]) -> list[Pushed]:
 
 def judge(pushes: Sequence[Pushed], rig: RigFile) -> Iterator[Finding]:
     """Probes that read the wrong way, or what was pushed another way; each forbids the lift."""
-    s, doubtful, least = stations(rig), rings.unshown(rig), SEEN * least_clearance(rig)
-    told: set[str] = set()
+    least, told = SEEN * least_clearance(rig), set[str]()
     for push in pushes:
-        share = {c: math.cos(push.angle - _counts(s, c)) for c in s.channels}
-        about = [c for c in doubtful if abs(share[c]) >= ABOUT and c not in told]
-        aside = [c for c in s.channels if abs(share[c]) < ACROSS and abs(push.read[c]) >= least]
+        share = leaning.reads(rig, push.angle)
+        about = [c for c in _shown(rig, push.angle) if c not in told]
+        aside = [c for c in share if abs(share[c]) < ACROSS and abs(push.read[c]) >= least]
         told.update(about)
         moved = [c for c in about if abs(push.read[c]) >= least * abs(share[c])]
         wrong = [c for c in moved if push.read[c] * share[c] < 0]
@@ -103,9 +110,9 @@ def judge(pushes: Sequence[Pushed], rig: RigFile) -> Iterator[Finding]:
             yield Finding("axes-exchanged", text, about[0], Effect.ERROR)
         elif len(moved) < len(about):
             still = next(c for c in about if c not in moved)
-            text = (f"the shaft was pushed {push.name}, where {still} should read {least * 1e6:.0f} µm and more: it reads "
-                    f"{push.read[still] * 1e6:+.0f} µm. Push until the shaft touches its rings and hold it there; else look at "
-                    "the probe. The shaft was not lifted.")  # fmt: skip
+            text = (f"the shaft was pushed {push.name}, where {still} should read {least * abs(share[still]) * 1e6:.0f} µm and "
+                    f"more: it reads {push.read[still] * 1e6:+.0f} µm. Push until the shaft touches its rings and hold it "
+                    "there; else look at the probe. The shaft was not lifted.")  # fmt: skip
             yield Finding("push-not-seen", text, still, Effect.ERROR)
         elif wrong and len(wrong) == len(about) > 1:
             text = (f"the shaft was pushed {push.name}, and all probes that look there say that it went the other way "
@@ -127,7 +134,8 @@ def of_recording(recording: Recording[Any]) -> Iterator[Finding]:
     if not made:
         yield from rings.of_unshown(recording.rig)
     elif not wrong:
-        names = ", ".join(rings.unshown(recording.rig))
+        shown = {c for p in made for c in _shown(recording.rig, p.angle)}
+        names = ", ".join(c for c in rings.unshown(recording.rig) if c in shown)
         ways = ", then ".join(p.name for p in made)
         yield Finding("polarity-shown", f"pushed by hand {ways}, the shaft shows that {names} count the right way", "")
 
@@ -136,6 +144,21 @@ def _counts(s: Stations, channel: str) -> float:
     """The direction in which the shaft moves where a probe's reading grows, rad from y towards z."""
     p = s.probes[channel]
     return p.angle.value + (0.0 if p.sign > 0 else math.pi)
+
+
+def _way(rig: RigFile, channel: str) -> float:
+    """The direction of a push that shows a probe: in which its reading grows, else the other one, if that shows more."""
+    grows = _counts(stations(rig), channel)
+    ways = (grows, math.remainder(grows + math.pi, 2 * math.pi))
+    one, other = (abs(leaning.reads(rig, way)[channel]) for way in ways)
+    return ways[0] if one >= min(ENOUGH, other) else ways[1]
+
+
+def _shown(rig: RigFile, angle: float) -> tuple[str, ...]:
+    """Channels of which a push shows what gravity does not say: as much as most pushes would, or as one along the probe."""
+    share = leaning.reads(rig, angle)
+    own = {c: abs(leaning.reads(rig, _way(rig, c))[c]) for c in rings.unshown(rig)}
+    return tuple(c for c, most in own.items() if abs(share[c]) >= max(min(ABOUT, most) - ROUNDING, TELLS))
 
 
 def _from_y(s: Stations, around: float) -> float:
@@ -148,7 +171,8 @@ def _name(s: Stations, channel: str, angle: float) -> str:
         along = math.cos(angle - p.angle.value)
         if abs(along) > ALIKE:
             return f"towards the {'+' if along > 0 else '-'} side of axis {name}"
-    return f"the way in which {channel} should grow"
+    grows = math.cos(angle - _counts(s, channel)) > 0
+    return f"the way in which {channel} should {'grow' if grows else 'fall'}"
 
 
 def _zero(rig: RigFile) -> str:

@@ -15,12 +15,13 @@ from bench.procedure.roles import Push
 from bench.rigfile import load_rig
 from bench.rigfile.envelope import Envelope
 from drivers.person import ConsoleOperator
-from procedures.amb_rotor import pushes
+from procedures.amb_rotor import leaning, pushes
 from procedures.amb_rotor.pushes import Pushed
 from procedures.amb_rotor.stations import stations
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 SPINDLE, STAND = (str(EXAMPLES / name) for name in ("vertical-spindle/spindle.toml", "plain-stand/stand.toml"))
+DISC = str(Path(__file__).resolve().parents[1] / "strangers/skivrotor.toml")
 
 
 def read(rig: str, angle: float, changed: Mapping[str, float] | None = None) -> dict[str, float]:
@@ -101,3 +102,35 @@ def test_a_twin_is_pushed_before_it_is_lifted(rig: str, defect: str, code: str, 
     assert wrong[:1] == ([(code, where)] if defect else [])
     assert ("polarity-shown" in [f.code for f in found]) == (not defect)
     assert len(run.recording.steps("lift")) == (code in ("", "lift-lost"))
+
+
+def leaned(changed: Mapping[str, float] | None = None) -> list[Pushed]:
+    """What sound probes read of a shaft of 23 kg that overhangs by a third, pushed with its weight; some times something."""
+    rig = load_rig(DISC)
+    s, out = stations(rig), list[Pushed]()
+    for p in pushes.wanted(rig):
+        angle = s.hand * (p.angle_rad - s.first.value)
+        read = {c: 200e-6 * x * (changed or {}).get(c, 1.0) for c, x in leaning.reads(rig, angle).items()}
+        out.append(Pushed(p.axis, angle, read))
+    return out
+
+
+def test_a_shaft_that_overhangs_is_pushed_the_way_it_moves() -> None:
+    """Its far ring carries 1.34 of its weight: upwards nobody moves it there; downwards its near end comes off the top."""
+    made = leaned()
+    assert [p.name for p in made] == ["towards the - side of axis dH", "towards the - side of axis dV"]
+    assert all(abs(p.read[c]) > 100e-6 for p, c in zip(made, ("lage_B_1", "lage_B_2"), strict=True))
+    assert codes(DISC, made) == []
+    assert codes(DISC, leaned({"lage_B_1": -1.0})) == [("sensor-polarity", "lage_B_1")]
+    assert codes(DISC, leaned({"lage_B_2": 0.1})) == [("push-not-seen", "lage_B_2")]
+    between = leaning.reads(load_rig(SPINDLE), 0.3)  # one that stands goes where it is pushed
+    s = stations(load_rig(SPINDLE))
+    assert between == pytest.approx({c: p.sign * math.cos(0.3 - p.angle.value) for c, p in s.probes.items()})
+
+
+def test_a_twin_that_overhangs_is_pushed_and_lifted(tmp_path: Path) -> None:
+    run = simulated_run("bearing-model", DISC, 0, {"settle_s": 0.4, "average_s": 0.2}, tmp_path / "pushed.mcap")
+    found = [f for f in run.results if isinstance(f, Finding)]
+    assert [f.code for f in found if f.effect is Effect.ERROR] == []
+    (shown,) = (f.text for f in found if f.code == "polarity-shown")
+    assert "lage_B_1, lage_B_2" in shown
