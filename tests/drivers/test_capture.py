@@ -190,7 +190,7 @@ def test_one_at_a_time(stand: Stand) -> None:
         role.arm(POSITIONS, seconds=0.1)
     with pytest.raises(BenchError, match="it is ARMED: nothing to upload yet"):
         role.upload()
-    with pytest.raises(BenchError, match=r"not recorded within 0.2 s: it is ARMED for SPEED  100, 200 samples so far"):
+    with pytest.raises(BenchError, match=r"not recorded within 0.2 s: it is ARMED for SPEED 100, 200 samples so far"):
         role.wait(0.2)
     role.cancel()
     role.arm(POSITIONS, seconds=0.1)

@@ -57,7 +57,8 @@ def test_columns_are_the_rigs_channels() -> None:
         )
     ]
     assert list(plant.channels) == [*positions, *coils, "volt_lower", "volt_upper", *marked, *status]
-    assert list(plant.trace_channels) == [*positions, *coils, *marked]
+    inside = ["angle", "speed", "pulses"]  # what it knows of the mark by its own names; the edge is called so here
+    assert list(plant.trace_channels) == [*positions, *coils, *marked[:5], *inside, *marked[5:]]
     rows, readings = plant.run(100, 5)
     assert rows.shape == (10, len(plant.channels))
     assert readings.shape == (20, len(plant.trace_channels))
