@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import zlib
 
+from bench.wire.captureblock import Block as Part
 from bench.wire.commandline import LONGEST, Line, Splitter, read_line, read_request, request
-from bench.wire.commandline import Block as Part
 from bench.wire.commandline import block as part_of
 from benchmarks.fuzz_draws import INPUTS, Block, Draw
 

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bench.wire.captureblock import Block
 from bench.wire.commandline import (
     LARGEST,
     LONGEST,
-    Block,
     Event,
     Line,
     Reply,

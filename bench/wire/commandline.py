@@ -19,6 +19,8 @@ from dataclasses import dataclass, field
 from functools import reduce
 from typing import Final, Literal
 
+from bench.wire.captureblock import Block
+
 SYNC: Final = b"\xa5\x5a"
 HEADER: Final = struct.Struct("<HIH")
 LARGEST: Final = 1024
@@ -39,15 +41,6 @@ class Line:
     """A line as it came, without its end."""
 
     text: str
-
-
-@dataclass(frozen=True)
-class Block:
-    """A part of a capture."""
-
-    number: int
-    offset: int
-    data: bytes
 
 
 @dataclass(frozen=True)

@@ -62,17 +62,15 @@ class AmbRotor:
     speed_told: bool
     marked: bool  # whether the angle and the speed are told by a mark
     clearance: float  # the least of the rings', m; infinite where the rig has none
-    pulsed: tuple[str, ...] = (
-        COUNT,
-        AGE,
-    )  # channels of a capture: the mark's count, its age; none where it has not both
+    pulsed: tuple[str, ...] = (COUNT, AGE)  # of a capture: the mark's count, its age; none where it has not both
     lacks: tuple[str, ...] = ()  # where the rig is not as these procedures take it
     crooked: tuple[str, ...] = ()  # where it is not two planes of like axes; what goes by rows takes it
     unweighed: tuple[str, ...] = ()  # where it is not as those take it that go by the shaft's weight
 
     @property
     def contact(self) -> Status:
-        return reduce(or_, self.rings.values(), self.axial_stop)  # a touch anywhere
+        """A touch anywhere."""
+        return reduce(or_, self.rings.values(), self.axial_stop)
 
     @property
     def all_axes(self) -> tuple[str, ...]:

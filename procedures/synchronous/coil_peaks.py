@@ -60,8 +60,8 @@ def blocks(full: Full) -> npt.NDArray[np.intp]:
 
 def peaks(d: Dwell, inputs: Mapping[str, Estimate], plane: str, rig: RigFile) -> dict[tuple[str, str], Estimate]:
     """Current and voltage of the plane's coil that needs most, with gain, zero, resolution, and the scatter over the turns;
-    nothing without a capture, no voltage
-    where none is captured."""
+    nothing without a capture, and
+    no voltage where none is captured."""
     if d.full is None:
         return {}
     first, edges = 2 * d.machine.planes[plane][0], blocks(d.full)

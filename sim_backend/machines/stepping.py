@@ -74,7 +74,10 @@ class Shown:
         count = round(1 / (0.5 * self.tick_s))  # zeros behind, for lines 0.5 Hz apart
         gain = np.abs(np.fft.rfft(np.diff(y, prepend=y[0]), count))[:1000]
         above = gain >= math.sqrt(0.5)
-        last = int(np.flatnonzero(above[SCANNED:-1] & ~above[SCANNED + 1 :])[0]) + SCANNED
+        falls = np.flatnonzero(above[SCANNED:-1] & ~above[SCANNED + 1 :]) + SCANNED
+        if not len(falls):  # between 20 and 500 Hz it does not
+            return math.inf
+        last = int(falls[0])
         return 0.5 * float(np.interp(-math.sqrt(0.5), -gain[last : last + 2], [last, last + 1]))
 
     def settling_time(self, band: float, window_s: float) -> float:

@@ -8,7 +8,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from lira_plants import rise_s
 
-from bench.wire.commandline import Block, Event, Line, Reply, Splitter, read_line, request
+from bench.wire.captureblock import Block
+from bench.wire.commandline import Event, Line, Reply, Splitter, read_line, request
 from sim_backend.machines.lira.device import Device
 from sim_backend.machines.lira.params import PlantParams
 from sim_backend.machines.lira.plant import TRACE, Plant

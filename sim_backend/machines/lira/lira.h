@@ -51,13 +51,13 @@ typedef struct {
     double stator[10], capacitor[10];         /* integrators; systems R1 B1 R2 B2 L, d and q */
     double wanted[10], manual[10];            /* dq references, and what is added to them */
     double coil_dq[10], u_dq[10], bridge_dq[10], u_ref[10], bridge_ref[10], sent_dq[10];
-    double ref[6], ref_rate[6], read[6], was[6], sighted[4], filtered[4], run[2], seen[6], seen_rate[6], summed[6], force[6], held[4];
+    double ref[6], ref_rate[6], read[6], was[6], sighted[4], filtered[4], run[2], seen[6], seen_rate[6], summed[6], force[6];
     double cos_ra[2], sin_ra[2], cos_la, sin_la; /* firmware's phases at the last reading of the position */
     double lag[20], contact, phase, injected;
     double zero_c[3], zero_s[3], uneven_c[2], uneven_s[2]; /* of the encoders' zeros (two rotary, linear) and of what is uneven */
     double star[5][216];                     /* exact step: columns of twelve for twelve states, three u_sw, three emfs */
     int32_t member[5][3];                    /* half-bridges of each star */
-    int32_t currents_on, bearings_on, angle_on, axial_on, fresh, limited, frozen;
+    int32_t currents_on, bearings_on, angle_on, axial_on, fresh, limited;
     double target[6], speed[6], rise[6]; /* where set points go, m or rad, and how fast at most */
     int32_t mode, fault, gate_clock, lost_clock;
     int64_t heard; /* tick of the last heartbeat; -1: none is waited for */

@@ -121,8 +121,8 @@ void lira_positions(const lira_params *p, const lira_control *c, lira_state *st)
         double up = st->force[Y1 + a] + weight;
         if (c->limit_after_ff != 0) up = clip(up, -c->sat_b, c->sat_b);
         st->wanted[4 * a] = 0;
-        st->wanted[4 * a + 2] = st->frozen ? st->held[a] : st->force[X1 + a] / c->model_bearing;
-        st->wanted[4 * a + 3] = st->frozen ? st->held[2 + a] : up / c->model_bearing;
+        st->wanted[4 * a + 2] = st->force[X1 + a] / c->model_bearing;
+        st->wanted[4 * a + 3] = up / c->model_bearing;
     }
     double axial = st->force[Z] + (st->axial_on ? c->model_cogging_force * sin(2 * TWO_PI / c->model_pitch * st->read[Z]) : 0);
     double torque = st->force[ANGLE] + (st->angle_on ? c->model_cogging_torque * sin(6 * POLE_PAIRS * st->read[ANGLE]) : 0);

@@ -53,10 +53,14 @@ def stored(p: PlantParams, q: Array) -> float:
     return float(out - p.cogging_force * p.pair_pitch / (4 * np.pi) * np.cos(2 * theta))
 
 
+def inertia(p: PlantParams) -> Array:
+    """Of x, y, alpha, beta, z and the angle, (6,)."""
+    return np.array([p.mass, p.mass, p.transverse_inertia, p.transverse_inertia, p.mass, p.polar_inertia])
+
+
 def moved(p: PlantParams, v: Array) -> float:
     """Kinetic energy, J."""
-    inertia = np.array([p.mass, p.mass, p.transverse_inertia, p.transverse_inertia, p.mass, p.polar_inertia])
-    return float(0.5 * (inertia * v * v).sum())
+    return float(0.5 * (inertia(p) * v * v).sum())
 
 
 def rates(p: PlantParams, state: Array, sent: Array) -> Array:
@@ -71,14 +75,13 @@ def rates(p: PlantParams, state: Array, sent: Array) -> Array:
     spin = -p.polar_inertia * v[5]  # the angle counts from y to x
     force[2] -= spin * v[3]
     force[3] += spin * v[2]
-    inertia = np.array([p.mass, p.mass, p.transverse_inertia, p.transverse_inertia, p.mass, p.polar_inertia])
     f_l, f_c, r_d, r = (np.array(x) for x in (p.filter_l, p.filter_c, p.damper_r, p.coil_r))
     through = (u - damper) / r_d
     inductance, lack = np.array(p.coil_l), u - r * coil - emf
     for star in (list(s) for s in STARS):
         lack[star] -= (lack[star] / inductance[star]).sum() / (1 / inductance[star]).sum()
     return np.concatenate([
-        v, force / inertia, (sent - p.filter_r * bridge - u) / f_l, (bridge - coil - through) / f_c,
+        v, force / inertia(p), (sent - p.filter_r * bridge - u) / f_l, (bridge - coil - through) / f_c,
         through / np.array(p.damper_c), lack / inductance,
     ])  # fmt: skip
 
