@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import re
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
+from bench.cli.virtual import simulated_run
+from bench.procedure import Measured
 from bench.rigfile.check import check_rig
 
+RIG = Path(__file__).resolve().parents[1] / "rigs/amb5dof.toml"
 FOLDER = Path(__file__).resolve().parent / "strangers"
 STIFF, EMPTY = "Styv = { karaktar = 1 }", "Mjuk = { karaktar = 0 }\nStyv = { karaktar = 1 }\n"
 INERTIA, MASS = "polar_inertia = { value = 0.16,", "mass = { value = 23,"
@@ -35,3 +42,36 @@ def test_what_is_there_twice_or_cannot_be_is_refused(
     assert place in told
     assert found in told
     assert expected in told
+
+
+def test_a_missing_counter_is_told_by_the_key_that_names_it(tmp_path: Path) -> None:
+    text = (FOLDER / "skivrotor.toml").read_text(encoding="utf-8")
+    assert 'counter = "raknare"\n' in text
+    (tmp_path / "skivrotor.toml").write_text(text.replace('counter = "raknare"\n', ""), encoding="utf-8")
+    (tmp_path / "skivrotor.dbc").write_bytes((FOLDER / "skivrotor.dbc").read_bytes())
+    (problem,) = check_rig(str(tmp_path / "skivrotor.toml"))[0]
+    assert "`devices.controller.binding.counter` set" in str(problem)
+
+
+def test_an_identifier_that_is_there_twice_is_told_once(tmp_path: Path) -> None:
+    dbc = (FOLDER / "skivrotor.dbc").read_text(encoding="utf-8")
+    first, second = re.findall(r"^BO_ (\d+) ", dbc, re.MULTILINE)[:2]
+    (tmp_path / "twice.dbc").write_text(dbc.replace(f"BO_ {second} ", f"BO_ {first} "), encoding="utf-8")
+    code = "import sys; from pathlib import Path; from bench.rigfile.messages import load_messages; "
+    code += "load_messages(Path(sys.argv[1]).read_text(encoding='utf-8'))"
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(tmp_path / "twice.dbc")], capture_output=True, text=True, check=False
+    )
+    assert "Overwriting" not in done.stderr
+
+
+def test_a_twin_tells_the_map_that_its_rig_file_expects(tmp_path: Path) -> None:
+    text = RIG.read_text(encoding="utf-8")
+    assert "map_version = 2" in text
+    path = tmp_path / RIG.name
+    path.write_text(text.replace("map_version = 2", "map_version = 7"), encoding="utf-8")
+    shutil.copy(RIG.with_suffix(".dbc"), tmp_path)
+    run = simulated_run(
+        "bearing-model", str(path), 0, {"spacing_m": 40e-6, "radius_m": 80e-6, "average_s": 0.2}, tmp_path / "s.mcap"
+    )
+    assert any(isinstance(r, Measured) for r in run.results)
