@@ -40,7 +40,7 @@ IN_TOML = [
     (', "AmbRest"]', "]", "channels.speed.signal", "a signal of the telemetry"),
     ('sequence = "SeqNo"', 'sequence = "Seq"', f"{KEY}.sequence", "it has SeqNo, Ticks"),
     ('tick = "Ticks"', "", f"{KEY}.tick", "no signal 'tick'"),
-    ('counter = "Rolling"', "", f"{KEY}.telemetry.AmbPos", "no signal 'count'"),
+    ('counter = "Rolling"', "", f"{KEY}.counter", "no signal 'count'"),
     ('counter = "Rolling"', 'counter = "XA"', f"{KEY}.telemetry.AmbCurX", "no signal 'XA'"),
     ('heartbeat = "HostAlive"', "", f"{KEY}.heartbeat", "no message 'Heartbeat'"),
     ('heartbeat_counter = "Count"', "", f"{KEY}.heartbeat", "no signal 'counter'"),

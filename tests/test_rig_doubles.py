@@ -55,7 +55,7 @@ def test_a_missing_counter_is_told_by_the_key_that_names_it(tmp_path: Path) -> N
 
 def test_an_identifier_that_is_there_twice_is_told_once(tmp_path: Path) -> None:
     dbc = (FOLDER / "skivrotor.dbc").read_text(encoding="utf-8")
-    first, second = re.findall(r"^BO_ (\d+) ", dbc, re.MULTILINE)[:2]
+    first, second = re.findall(r"^BO_ (\d+) ", dbc, re.MULTILINE)[2:4]
     (tmp_path / "twice.dbc").write_text(dbc.replace(f"BO_ {second} ", f"BO_ {first} "), encoding="utf-8")
     code = "import sys; from pathlib import Path; from bench.rigfile.messages import load_messages; "
     code += "load_messages(Path(sys.argv[1]).read_text(encoding='utf-8'))"
