@@ -41,7 +41,7 @@ IN_TOML = [
     ('sequence = "SeqNo"', 'sequence = "Seq"', f"{KEY}.sequence", "it has SeqNo, Ticks"),
     ('tick = "Ticks"', "", f"{KEY}.tick", "no signal 'tick'"),
     ('counter = "Rolling"', "", f"{KEY}.counter", "no signal 'count'"),
-    ('counter = "Rolling"', 'counter = "XA"', f"{KEY}.telemetry.AmbCurX", "no signal 'XA'"),
+    ('counter = "Rolling"', 'counter = "XA"', f"{KEY}.counter", "no signal 'XA'"),
     ('heartbeat = "HostAlive"', "", f"{KEY}.heartbeat", "no message 'Heartbeat'"),
     ('heartbeat_counter = "Count"', "", f"{KEY}.heartbeat", "no signal 'counter'"),
     ('heartbeat = "HostAlive"\nheartbeat_counter = "Count"', 'heartbeat = "HostTuning"\nheartbeat_counter = "BiasA"',
