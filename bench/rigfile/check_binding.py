@@ -97,8 +97,11 @@ def _names(rig: RigFile, messages: MessageMap) -> Iterator[Found]:
     b = rig.binding
     paths = {f"{KEY}.sequence": f"{b.telemetry[0]}.{b.sequence}", f"{KEY}.tick": f"{b.telemetry[0]}.{b.tick}",
              f"{KEY}.heartbeat": f"{b.heartbeat}.{b.heartbeat_counter}"}  # fmt: skip
-    paths |= {f"{KEY}.telemetry.{m}": f"{m}.{b.counter}" for m in b.telemetry[1:]}
-    for where, path in paths.items():
+    further = [
+        (f"{KEY}.counter" if m in messages.messages else f"{KEY}.telemetry", f"{m}.{b.counter}")
+        for m in b.telemetry[1:]
+    ]
+    for where, path in (*paths.items(), *further):
         if wrong := find(messages, path):
             yield where, wrong, f"a message and signal of {rig.link.dbc}, or `{where}` set to this controller's own"
     for m in sorted({m for m in b.telemetry if b.telemetry.count(m) > 1}):

@@ -85,7 +85,21 @@ def _stops(rig: RigFile) -> tuple[str, ...]:
 def _values(rig: RigFile) -> Iterator[Line]:
     c = rig.capabilities
     for kind, names in c.settings.items():
+        if not names:
+            yield (
+                f"settings.{kind}",
+                "no names",
+                "what can be chosen, each with the parameters that choose it, or no such table",
+            )
+        chosen: dict[tuple[tuple[str, float], ...], str] = {}
         for name, values in names.items():
+            same = chosen.setdefault(tuple(sorted(values.items())), name)
+            if values and same != name:
+                yield (
+                    f"settings.{kind}.{name}",
+                    f"the values of settings.{kind}.{same}",
+                    "values of its own: both choose the same",
+                )
             if not values:
                 yield f"settings.{kind}.{name}", "no values", "the parameters that choose it, with their values"
             for parameter, value in values.items():

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Iterator
 
 from bench.errors import Problem
 from bench.rigfile.check_machine import references_in
 from bench.rigfile.model import RigFile
+from bench.rigfile.numbers import numbers_at
+from bench.rigfile.places import WITHOUT_NUMBERS
+from bench.rigfile.toleranced import Toleranced
 
 GEOMETRY = {"amb_gap": "air gap of the radial AMBs", "clearance": "clearance of the touchdown bearings"}
 SHAFT_GEOMETRY = {
@@ -59,6 +63,25 @@ def problems_of(rig: RigFile) -> Iterator[Problem]:
             yield Problem(rig.path, f"geometry.{key}", "a length nobody asks for",
                           f"did you mean {close[0]}?" if close else "no such key")  # fmt: skip
     yield from _lengths(rig)
+    yield from _identities(rig)
+    if (
+        rig.shaft is not None
+        and isinstance(tilt := rig.shaft.tilt, Toleranced)
+        and abs(tilt.value) > math.pi / 2 + 1e-9
+    ):
+        found = f"{math.degrees(tilt.value):g}°"
+        yield Problem(rig.path, "shaft.tilt.value", found, "-90 to 90°: how far the far end is above the horizontal")
+
+
+def _identities(rig: RigFile) -> Iterator[Problem]:
+    """Two numbers that share an identity: draws and budgets would take one of them for both."""
+    taken: dict[str, str] = {}
+    tables = {name: getattr(rig, name) for name in type(rig).model_fields if name not in WITHOUT_NUMBERS}
+    for place, number in numbers_at(tables):
+        first = taken.setdefault(number.id or place, place)
+        if first != place:
+            expected = f"an identity of its own: it is that of {first.replace('/', '.')}, too"
+            yield Problem(rig.path, f"{place.replace('/', '.')}.id", repr(number.id or place), expected)
 
 
 def _lengths(rig: RigFile) -> Iterator[Problem]:

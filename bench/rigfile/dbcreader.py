@@ -4,6 +4,7 @@ than to read a rig file."""
 from __future__ import annotations
 
 import importlib.util
+import logging
 import sys
 from types import ModuleType
 from typing import Any
@@ -25,3 +26,4 @@ def _database() -> ModuleType:
 
 
 database = _database()
+logging.getLogger("cantools").addHandler(logging.NullHandler())  # what it warns of, `bench check` says by place

@@ -58,17 +58,22 @@ class Sum:
 
 def numbers_in(tree: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[str, Toleranced]]:
     """Every number below a table of the rig file, with its identity."""
+    return ((number.id or place, number) for place, number in numbers_at(tree, path))
+
+
+def numbers_at(tree: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[str, Toleranced]]:
+    """Every number below a table of the rig file, with its place there."""
     if isinstance(tree, Toleranced):
-        yield tree.id or "/".join(path), tree
+        yield "/".join(path), tree
     elif isinstance(tree, Mapping):
         for name, branch in tree.items():
-            yield from numbers_in(branch, (*path, str(name)))
+            yield from numbers_at(branch, (*path, str(name)))
     elif isinstance(tree, tuple):
         for k, branch in enumerate(tree):
-            yield from numbers_in(branch, (*path, str(k)))
+            yield from numbers_at(branch, (*path, str(k)))
     elif hasattr(type(tree), "model_fields"):
         for name, field in type(tree).model_fields.items():
-            yield from numbers_in(getattr(tree, name), (*path, field.alias or name))
+            yield from numbers_at(getattr(tree, name), (*path, field.alias or name))
 
 
 def referred(text: str, known: Mapping[str, Toleranced]) -> Sum:

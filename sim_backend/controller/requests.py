@@ -58,6 +58,8 @@ class Requests:
         handlers |= {"Command": self._command} if replied else {}
         handlers |= {name: partial(self._capture, name) for name in CAPTURES[:4] if captures is not None}
         handlers[rig.binding.heartbeat] = self._heartbeat
+        stated = rig.devices["controller"].map_version  # it is that rig's controller, whichever map that has
+        self._map_version = MAP_VERSION if stated is None else stated
         self._handlers = {
             there[n].identifier: (Decoder(there[n]), handler) for n, handler in handlers.items() if n in there
         }
@@ -128,7 +130,7 @@ class Requests:
             if name not in ("IDENTIFY", "RELEASE"):  # which is answered whole each time, and which ends the owner
                 self._owner.answered("Command", v, status)
         if name == "IDENTIFY" and status == "OK":
-            tell("Identity", {"protocol": 1, "map_version": MAP_VERSION, "serial": 0})
+            tell("Identity", {"protocol": 1, "map_version": self._map_version, "serial": 0})
         echoed: Values = {str(signal): v[signal] for signal in ("code", "token") if signal in v}
         tell("CommandReply", {**echoed, "status": self._status("CommandReply", status), "state": self._state()})
 
