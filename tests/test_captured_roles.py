@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from bench.cli.virtual import simulated_run
@@ -11,6 +12,9 @@ from bench.findings import Effect, Finding
 from bench.procedure import Measured
 from bench.rigfile import load_rig
 from bench.rigfile.recorded import pulsed, unrecorded
+from procedures.sensitivity.injection import Comb, repeated
+from procedures.sensitivity.margins import _freed
+from procedures.shared.rates import of_rate, rate_of
 from procedures.synchronous.dwells import can_capture, uncapturable
 from procedures.unbalance.procedure import VOLTAGE, of_captures
 from sim_backend.controller.capture_memory import CaptureMemory, Order
@@ -63,6 +67,36 @@ def test_triggers_of_the_mark_go_by_the_rig_file_and_no_request_raises() -> None
         memory.cancel()
     bare = CaptureMemory(rig.capture, [n for n in names if n != "pulses"], told_by(rig, names))
     assert bare.arm(Order(1 << 18, 1, 100, 0, "NOW")) == "UNKNOWN_CHANNEL"
+
+
+def test_a_margin_that_its_bias_takes_below_zero_is_not_told() -> None:
+    """It had a negative number of decibels' argument."""
+    draws = np.full(100, 0.5)
+    assert _freed(0.2, 0.2, draws) is None
+    assert _freed(0.6, 0.2, draws) == pytest.approx((0.3, 0.0))
+
+
+FASTER = ("tick_s = 5e-5", "tick_s = 8e-5")
+
+
+def test_a_plan_without_a_rate_takes_the_controllers_nearest(tmp_path: Path) -> None:
+    rig = load_rig(edited(tmp_path, FASTER))
+    assert rate_of(rig, None) == pytest.approx(12500)
+    assert rate_of(rig, None, 500.0) == pytest.approx(500)
+    assert list(of_rate(rig, None)) == list(of_rate(rig, 6250.0)) == []
+    (text,) = of_rate(rig, 10000.0)
+    assert "12500, 6250, 4166.67" in text
+    assert rate_of(load_rig(str(TILTED)), None) == pytest.approx(10000)
+
+
+def test_periods_of_combs_are_whole_samples() -> None:
+    """0.125 s at 12.5 kHz are 1562.5 samples."""
+    comb = Comb(8.0, 16.0, 12, 4e-3)
+    assert comb.period_s == 0.125
+    assert repeated(comb, 10000.0) is comb
+    made = repeated(comb, 12500.0)
+    assert (made.period_s, made.hz) == (0.25, comb.hz)
+    assert repeated(comb, 1 / 9e-5).period_s * (1 / 9e-5) == pytest.approx(12500)
 
 
 @pytest.mark.parametrize("procedure", ["unbalance", "run-up"])

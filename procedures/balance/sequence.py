@@ -33,6 +33,7 @@ from procedures.balance.steps import (
     read_telemetry,
     watched_channels,
 )
+from procedures.shared.rates import rate_of
 from procedures.synchronous import bearings, dwelling
 from procedures.synchronous.dwells import DWELL, SLOW, can_capture
 
@@ -107,7 +108,7 @@ def _roll(work: Work) -> bool:
     if not lift.bring_to_speed(rig, work.record, plan.slow_rad_s, plan.settle_s):
         dwelling.stop(rig)
         return False
-    work.slow = _dwell(work, SLOW, BASE, plan.slow_rad_s, plan.slow_s, plan.slow_s, SLOW_HZ)
+    work.slow = _dwell(work, SLOW, BASE, plan.slow_rad_s, plan.slow_s, plan.slow_s, rate_of(rig.file, None, SLOW_HZ))
     if work.slow is None:
         dwelling.stop(rig)
     return work.slow is not None

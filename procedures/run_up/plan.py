@@ -24,7 +24,7 @@ class Passing(BenchPlan):
     slow_s: float = Field(10.0, ge=1)
     settle_s: float = Field(1.5, ge=0.2)
     capture_s: float = Field(0.3, ge=0.05)
-    rate_hz: float = Field(10000.0, gt=0)  # of the captures
+    rate_hz: float | None = Field(None, gt=0)  # of captures; none: the nearest to 10 kHz
     orders: int = Field(4, ge=1, le=10)  # that the full spectrum must show
     blocks: int = Field(150, ge=30, le=1000)  # of equal width in speed
     bearings: Literal["adopted", "plan"] = (

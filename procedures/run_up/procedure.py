@@ -32,6 +32,7 @@ from procedures.run_up.estimates import Run
 from procedures.run_up.plan import Passing, Plan
 from procedures.run_up.steps import MISSED, PASSAGE, read_passage
 from procedures.shared import assumptions, first_look
+from procedures.shared.rates import rate_of
 from procedures.synchronous import bearings, dwelling
 from procedures.synchronous import checks as dwell_checks
 from procedures.synchronous.coil_peaks import find_uncertified
@@ -142,7 +143,11 @@ def _arm(rig: Rig, plan: Passing, speed: float) -> None:
     if rig.capture is not None and can_capture(rig.file):
         names = captured_channels(conventions(rig.file))
         rig.capture.arm(
-            names, seconds=plan.capture_s, before_s=plan.capture_s / 2, rate_hz=plan.rate_hz, trigger=at_speed(speed)
+            names,
+            seconds=plan.capture_s,
+            before_s=plan.capture_s / 2,
+            rate_hz=rate_of(rig.file, plan.rate_hz),
+            trigger=at_speed(speed),
         )
 
 

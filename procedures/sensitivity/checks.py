@@ -52,6 +52,11 @@ def before(recording: Recording[Any]) -> Iterator[Finding]:
             return
         grid, rate = grid_of(step.labels), captured[0].rate_hz
         if folds(grid, rate):
+            if grid.hz.max() <= 0.45 * rate:
+                text = (f"captured at {rate:g} Hz; lines that repeat after {grid.period:g} s are {grid.period * rate:g} "
+                        "samples; expected a whole number: another rate.")  # fmt: skip
+                yield Finding("aliasing", text, where, Effect.ERROR)
+                return
             text = (f"captured at {rate:g} Hz; lines up to {grid.hz.max():g} Hz that repeat after {grid.period:g} s need "
                     f"{grid.hz.max() / 0.45:.0f} Hz or more: what is above half of it appears elsewhere.")  # fmt: skip
             yield Finding("aliasing", text, where, Effect.ERROR)

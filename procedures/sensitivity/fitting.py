@@ -12,10 +12,11 @@ from bench.rigfile.envelope import Envelope
 from bench.units import RPM
 from procedures.amb_rotor.conventions import conventions
 from procedures.sensitivity import sines
-from procedures.sensitivity.injection import Comb, find_refusal
+from procedures.sensitivity.injection import Comb, find_refusal, in_whole_samples
 from procedures.sensitivity.plan import Plan
 from procedures.sensitivity.steps import REFINED, captured_channels
 from procedures.shared.limits import landing_speed
+from procedures.shared.rates import of_rate
 
 LEAST_S = 4.0  # of a capture of the second grid: four periods of the finest
 
@@ -57,8 +58,13 @@ def _injection(rig: RigFile, plan: Plan, combs: Sequence[tuple[str, Comb]]) -> I
         yield f"axes: found {', '.join(plan.axes)}; expected each once"
     top = max(hz for _, c in combs for hz in c.hz)
     if top > 0.45 * sines.rate(rig, plan):
-        yield (f"rate_hz: found {plan.rate_hz:g}; expected {top / 0.45:.0f} Hz or more for lines up to {top:g} Hz: what is "
-               "above half of it folds back")  # fmt: skip
+        yield (f"rate_hz: found {sines.rate(rig, plan):g}; expected {top / 0.45:.0f} Hz or more for lines up to {top:g} Hz: "
+               "what is above half of it folds back")  # fmt: skip
+    yield from of_rate(rig, plan.rate_hz)
+    for comb in (c for _, c in combs if not in_whole_samples(c.period_s, sines.rate(rig, plan))):
+        yield (f"rate_hz: found {sines.rate(rig, plan):g}; lines that repeat after {comb.period_s:g} s need whole samples "
+               "within a few of these: expected another of the controller's rates")  # fmt: skip
+        break
     yield from _memory(rig, plan, combs)
 
 

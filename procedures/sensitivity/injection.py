@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from bench.errors import BenchError, Lacking
@@ -14,6 +14,8 @@ from bench.rigfile.capabilities import Injection
 from bench.rigfile.envelope import Envelope
 
 MOST_LINES = 128
+MOST_PERIODS = 16  # that count as one
+WHOLE = 1e-6  # of the samples of a period: how far they may be from a whole number
 CREST = 1.1  # greatest of Schroeder's phases over sqrt(2 lines) amplitudes: 1.08 at three lines, less elsewhere
 
 
@@ -46,6 +48,19 @@ class Comb:
     def peak(self) -> float:
         """What the sum does not exceed, A."""
         return self.amplitude * min(CREST * math.sqrt(2 * self.count), self.count)
+
+
+def in_whole_samples(period_s: float, rate_hz: float) -> bool:
+    """Whether a period has a whole number of samples."""
+    samples = period_s * rate_hz
+    return abs(samples - round(samples)) <= WHOLE * samples
+
+
+def repeated(comb: Comb, rate_hz: float) -> Comb:
+    """The same over so many of its periods that they have whole samples; as it is where no few of them have."""
+    counts = (m for m in range(1, MOST_PERIODS + 1) if in_whole_samples(m * comb.period_s, rate_hz))
+    count = next(counts, 1)
+    return comb if count == 1 else replace(comb, repeat_s=count * comb.period_s)
 
 
 def combs(first: float, step: float, last: float, amplitude: float) -> list[Comb]:

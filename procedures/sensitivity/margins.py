@@ -185,7 +185,8 @@ def _freed(found: float, again: float, values: Array) -> tuple[float, float] | N
     if not (math.isfinite(found) and math.isfinite(again) and known.mean() > 1 - TOLERATED):
         return None
     u = float(values[known].std())
-    return (found - (float(values[known].mean()) - again), u) if u <= VAGUE * found else None
+    freed = found - (float(values[known].mean()) - again)
+    return (freed, u) if u <= VAGUE * found and freed > 0 else None  # a bias as large as the margin: it is not told
 
 
 def _crossings(level: Array, other: Complex) -> Complex:

@@ -31,7 +31,7 @@ class Plan(BenchPlan):
     settle_s: float = Field(8.0, ge=0.5)  # under the law, before anything is injected
     start_s: float = Field(0.5, ge=0.1)  # of each injection
     survey_start_s: float = Field(1.5, ge=0.1)  # of the survey: a slow integrator answers its lowest lines
-    rate_hz: float = Field(10000.0, gt=0)  # of the captures
+    rate_hz: float | None = Field(None, gt=0)  # of captures; none: the nearest to 10 kHz
     max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
     max_speed_error: float = Field(0.01, gt=0)  # share of the speed
     max_change: float = Field(0.05, gt=0)  # of S_max, at half the amplitude: linear enough

@@ -31,7 +31,7 @@ from procedures.sensitivity import checks, estimates, fitting, modes, sines
 from procedures.sensitivity import figures as drawn
 from procedures.sensitivity.estimates import Candidate, Result
 from procedures.sensitivity.fitting import chosen_axes
-from procedures.sensitivity.injection import Comb, combs, inject
+from procedures.sensitivity.injection import Comb, combs, inject, repeated
 from procedures.sensitivity.plan import Plan
 from procedures.sensitivity.steps import (
     HALF,
@@ -100,7 +100,8 @@ def refinements(plan: Plan, about: Candidate, speed: float) -> list[tuple[str, f
 
 def first_pass(rig: RigFile, plan: Plan, speed: float) -> list[tuple[str, float, Comb]]:
     """What is injected first: combs, or sines where the controller makes one at a time."""
-    return sines.surveys(rig, plan) if sines.makes_one(rig) else surveys(plan, speed)
+    made = sines.surveys(rig, plan) if sines.makes_one(rig) else surveys(plan, speed)
+    return [(kind, about, repeated(comb, sines.rate(rig, plan))) for kind, about, comb in made]
 
 
 def size(rig: RigFile, kind: str, speed: float) -> int:
@@ -170,6 +171,7 @@ def _take(
     rig: Rig, plan: Plan, record: Recorder, speed: float, axis: str, kind: str, about: float, comb: Comb, number: int
 ) -> Response | None:
     """Inject, capture, upload; what S seems to be, for deciding how to go on; None where that cannot be told."""
+    comb = repeated(comb, sines.rate(rig.file, plan))
     labels: dict[str, float | str] = {
         "axis": axis, "speed_rad_s": speed, "pass": kind, "about_hz": about, "number": number, "first_hz": comb.first,
         "step_hz": comb.step, "lines": comb.count, "period_s": comb.period_s, "amplitude_A": comb.amplitude,

@@ -20,6 +20,7 @@ from procedures.sensitivity.estimates import FINEST, IN_WIDTH, LEAST, REACH, Can
 from procedures.sensitivity.injection import Comb
 from procedures.sensitivity.plan import Plan
 from procedures.sensitivity.steps import HALF, MODE, REFINED, SURVEY, WIRING, Grid, Taken
+from procedures.shared.rates import rate_of
 
 OCTAVE = 6  # lines
 CYCLES = 1  # of a line in what repeats, at least
@@ -38,8 +39,8 @@ def makes_one(rig: RigFile) -> bool:
 
 
 def rate(rig: RigFile, plan: Plan) -> float:
-    """Of a capture, Hz: the plan's, or the controller's own where that is less."""
-    return min(plan.rate_hz, 1 / rig.devices["controller"].tick_s)
+    """Of a capture, Hz."""
+    return rate_of(rig, plan.rate_hz)
 
 
 def amplitude(rig: RigFile, plan: Plan) -> float:

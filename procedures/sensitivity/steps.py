@@ -17,6 +17,7 @@ from bench.recording import Recording, Step
 from bench.rigfile.roles import SPEED, STATUS
 from bench.units import RPM
 from procedures.amb_rotor.conventions import AmbRotor, conventions
+from procedures.sensitivity.injection import in_whole_samples
 from procedures.shared.signals import clips
 
 Array = npt.NDArray[np.float64]
@@ -26,7 +27,6 @@ WIRING, SURVEY, SCAN, MODE, REFINED, HALF = "wiring", "survey", "scan", "mode", 
 LOOP = ("inject", "before", "after")
 ORDERS = (1.0, 2.0, 3.0, 4.0)
 CLEAR_HZ = 3.0  # to either side of an order of the shaft's speed
-WHOLE = 1e-6  # of the samples of a period: how far they may be from a whole number
 SHARING, FEW = 15, 4  # lines to either side that share a noise; at the ends of a grid
 
 
@@ -128,8 +128,7 @@ def captured_channels(machine: AmbRotor, kind: str, speed: float) -> tuple[str, 
 
 def folds(grid: Grid, rate: float) -> bool:
     """Whether the lines are too high for a capture's rate, or do not lie on its bins."""
-    samples = grid.period * rate
-    return bool(grid.hz.max() > 0.45 * rate or abs(samples - round(samples)) > WHOLE * samples)
+    return bool(grid.hz.max() > 0.45 * rate or not in_whole_samples(grid.period, rate))
 
 
 def sensitivity(

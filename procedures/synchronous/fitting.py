@@ -11,6 +11,7 @@ from bench.rigfile.capture import Layout
 from bench.units import RPM
 from procedures.amb_rotor.conventions import AmbRotor, conventions
 from procedures.shared.limits import landing_speed
+from procedures.shared.rates import of_rate, rate_of
 from procedures.synchronous.bearings import has_model
 from procedures.synchronous.dwells import TELLS, can_capture, captured_channels, telemetry_period_s
 from procedures.synchronous.identified import FEWEST
@@ -40,11 +41,15 @@ def of_slow_roll(rig: RigFile, rad_s: float, seconds: float, speeds: Sequence[fl
         yield f"slow_s: found {seconds:g} s; expected {TURNS} turns at {rad_s * RPM:.0f} r/min or more"
 
 
-def of_captures(rig: RigFile, capture_s: float, rate_hz: float, orders: int, speeds: Sequence[float]) -> Iterator[str]:
+def of_captures(
+    rig: RigFile, capture_s: float, planned: float | None, orders: int, speeds: Sequence[float]
+) -> Iterator[str]:
     """Captures that are too slow for the highest of the orders, too long for the controller, or of too few turns."""
     if not can_capture(rig):
         yield from _of_telemetry(rig, speeds)
         return
+    yield from of_rate(rig, planned)
+    rate_hz = rate_of(rig, planned)
     highest = orders * max(speeds) / (2 * math.pi)
     if rate_hz < PER_TURN * highest:
         yield (f"rate_hz: found {rate_hz:g}; expected {PER_TURN * highest:.0f} Hz or more for order {orders} at "

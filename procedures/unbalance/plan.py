@@ -22,7 +22,7 @@ class Plan(BenchPlan):
     settle_s: float = Field(1.5, ge=0.2)  # at a speed, and with a setting
     dwell_s: float = Field(3.0, ge=0.5)
     capture_s: float = Field(0.3, ge=0.05)
-    rate_hz: float = Field(10000.0, gt=0)  # of the capture
+    rate_hz: float | None = Field(None, gt=0)  # of captures; none: the nearest to 10 kHz
     orders: int = Field(4, ge=1, le=10)  # that the full spectrum must show
     repeat: bool = True  # the lowest speed again, at the end
     bearings: Literal["adopted", "plan"] = (

@@ -7,6 +7,7 @@ from bench.recording.recorder import Recorder
 from procedures.amb_rotor import lift
 from procedures.amb_rotor.conventions import Variant, conventions
 from procedures.amb_rotor.lift import write
+from procedures.shared.rates import rate_of
 from procedures.synchronous.dwelling import roll_slowly, step_labels
 from procedures.synchronous.dwells import DWELL, can_capture, captured_channels
 from procedures.unbalance.plan import Plan
@@ -49,7 +50,7 @@ def _dwell(rig: Rig, plan: Plan, record: Recorder, speed: float, variant: Varian
         captures = rig.capture is not None and can_capture(rig.file)
         if rig.capture is not None and captures:
             names = captured_channels(conventions(rig.file))
-            rig.capture.arm(names, seconds=plan.capture_s, rate_hz=plan.rate_hz)
+            rig.capture.arm(names, seconds=plan.capture_s, rate_hz=rate_of(rig.file, plan.rate_hz))
             rig.capture.wait(plan.capture_s + 5.0)
         rig.clock.sleep(max(plan.dwell_s - plan.capture_s, MARGIN_S) if captures else plan.dwell_s)
     if rig.capture is not None and captures:
