@@ -34,8 +34,8 @@ BAND_NOISE = 5.0  # of settling, at least, over the noise of the averaged positi
 NEAR = 3.0  # standard uncertainties from the band's edge within which an extreme is not told from one that touches it
 DRAWS, FEW, PARTS = 1000, 20, 20  # PARTS: of the draws, of which one is in memory at a time
 PER_SWING, DEAD = 100.0, 1e-4  # times looked at in a period, until the swing is that small
-# Times looked at in the shortest time constant from then on: between them a decay is taken for straight, which makes it cross an
-# edge late by its time constant over 8 PER_FADE² at most, 2 µs of 60 ms (5 ms apart it was 50 µs).
+# Times looked at in the shortest time constant from then on: between them a decay is taken for straight, which makes it cross
+# an edge late by its time constant over 8 PER_FADE² at most, 2 µs of 60 ms (5 ms apart it was 50 µs).
 PER_FADE = 60.0
 FIRST, SECOND, PLAIN = (
     3,
