@@ -81,13 +81,20 @@ class Shown:
         return 0.5 * float(np.interp(-math.sqrt(0.5), -gain[last : last + 2], [last, last + 1]))
 
     def settling_time(self, band: float, window_s: float) -> float:
-        """Until the mean over a window stays in the band about 1."""
+        """Until the mean over a window stays in the band about 1, between ticks as they say: a reading stands for half a tick
+        either way."""
         total = np.concatenate(([0.0], np.cumsum(self.y)))
         n = round(window_s / self.tick_s)
         at = np.arange(1, len(self.y) + 1)
         mean = (total[at] - total[np.maximum(at - n, 0)]) / np.minimum(at, n)
-        outside = np.flatnonzero(np.abs(mean - 1) > band)
-        return 0.0 if not len(outside) else float(self.t[outside[-1]]) + self.tick_s
+        beyond = np.abs(mean - 1) - band
+        outside = np.flatnonzero(beyond > 0)
+        if not len(outside):
+            return 0.0
+        last = int(outside[-1])
+        two = beyond[last : last + 2]
+        into = float(two[0] / (two[0] - two[1])) if len(two) == 2 else 0.5
+        return float(self.t[last]) + (0.5 + into) * self.tick_s
 
     @property
     def _swing(self) -> int:
