@@ -147,7 +147,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     plan, rig = recording.plan, recording.rig
     moves = read_moves(recording)
     findings.gate(checks.of_signals(moves, conventions(rig), plan), checks.FATAL)
-    by_case = estimates.by_case(moves, rig, plan.band, 2 * math.pi / plan.encoder_counts)
+    by_case = estimates.by_case(moves, rig, plan.band, 2 * math.pi / plan.encoder_counts, plan.kp_theta)
     findings.add(checks.of_responses(by_case, plan, {c: _loop(rig, plan, c) for c in by_case}))
     findings.add(checks.compared(by_case))
     return Results(moves, by_case, (conventions(rig).bearings[1], next(iter(rig.motors), "motor")))
