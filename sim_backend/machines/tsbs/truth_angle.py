@@ -46,6 +46,7 @@ def angle_steps(rig: RigFile, drawn: Truth, asked: AngleAsked) -> Mapping[tuple[
     paths: dict[str, list[_Path]] = {}
     for replica in range(REPLICAS):
         machine = _Carried(rig, drawn, asked, (drawn.noise + SEED * (1 + replica)) % 2**63)
+        machine.begin(next(iter(asked.cases.values())))
         idle = iter(asked.idle)
         for where, case in asked.cases.items():
             for k in range(2 * asked.repeats):
@@ -118,6 +119,13 @@ class _Carried:
 
     def _wait(self, seconds: float) -> None:
         self.plant.run(round(seconds / TICK_S))
+
+    def begin(self, case: AngleCase) -> None:
+        """A step each way that is not recorded, as the run begins."""
+        self._write(case.settings)
+        for target in (case.size, 0.0):
+            self._write({self.asked.reference: target})
+            self._wait(self.asked.standstill_s + self.asked.record_s)
 
     def moved(self, case: AngleCase, k: int, idle_s: float) -> tuple[_Path, list[tuple[str, float]]]:
         """One step, to the angle (even `k`) or back, after nothing was recorded for `idle_s`."""
