@@ -30,7 +30,7 @@ from procedures.shared.certificates import certified_gain
 
 Array = npt.NDArray[np.float64]
 WAYS = (True, False)  # to the angle, and back
-TICKS = 0.05  # of a tick: a crossing, where steps that are alike meet the same ticks
+TICKS = 0.1  # of a tick: a crossing, where steps that are alike meet the same ticks
 BETWEEN = 0.009  # of a count: what a turning point is off in all steps of one way (simulated swings)
 EACH = 0.008  # of a count: what it is off in one step
 
@@ -67,12 +67,13 @@ def _estimates(
     tick = float(swings[0].t[1])
     between = _read(f"edges/{where}", "encoder between its counts", BETWEEN * count, "rad")
     crossings = _read(f"ticks/{where}", "sampling", tick * TICKS, "s")
-    overshoot = _learned(f"overshoot/{where}", "1", _ways(found, [f.overshoot for f in found]))
+    tops = _ways(found, [f.overshoot for f in found])
+    overshoot, (top, dof) = _learned(f"overshoot/{where}", "1", tops), noise(tops)
     rise = _learned(f"rise_time/{where}", "s", _ways(found, [f.rise for f in found]))
     out = {
         "rise_time": rise + crossings * math.sqrt(2),
         "overshoot": overshoot + between * (1 / case.size),
-        "settling_time": _settling(where, found, overshoot.u * case.size, count) + crossings,
+        "settling_time": _settling(where, found, (top * case.size, dof), count) + crossings,
         "final_error": _final(where, found, done, count, kp),
         **_peaks(where, found, done, rig),
         **bounds.estimates(where, swings, rig, case.allocation == "priority"),
@@ -85,11 +86,11 @@ def _estimates(
     return out
 
 
-def _settling(where: str, found: Sequence[Fine], top: float, count: float) -> Estimate:
-    """The mean over the steps, and over what their angles may be off; `top` rad is what noise does to the mean of their turning
-    points. A swing that ends near the band leaves it in one step and not in the next: what is told is how often, which jumps
-    nowhere."""
-    each = np.array([f.settlings(math.hypot(top * math.sqrt(len(found)), EACH * count)) for f in found])
+def _settling(where: str, found: Sequence[Fine], top: tuple[float, int], count: float) -> Estimate:
+    """The mean over the steps, and over what their angles may be off; `top`: what noise does to a turning point, rad, and the
+    degrees of freedom by which it may be more. A swing that ends near the band leaves it in one step and not in the next: what
+    is told is how often, which jumps nowhere."""
+    each = np.array([f.settlings(math.hypot(top[0], EACH * count), top[1]) for f in found])
     alike = np.array([f.settlings(BETWEEN * count) for f in found])
     chance = Influence(id=f"scatter/settling_time/{where}", name="whether a swing leaves the band", unit="s", kind="B",
                        u=math.sqrt(float(each.var(axis=1).sum())) / len(found), distribution="normal")  # fmt: skip

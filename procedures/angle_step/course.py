@@ -69,14 +69,15 @@ class Course:
         return float(self.t[k] + part * (self.t[k + 1] - self.t[k]))
 
 
-def course(found: Edges, t: Array, torque: Array, begins: int) -> Course:
-    """Of edges (in the step's direction, from where it began), and the torque current (n,) A at times (n,) s in that direction
-    too, which answers at tick `begins`."""
+def course(found: Edges, t: Array, told: Array, torque: Array, begins: int) -> Course:
+    """Of edges (in the step's direction, from where it began), and at times (n,) s in that direction too: the angle that is
+    `told`, rad, of which it is off half a count at most, and the torque current, A, which answers at tick `begins`."""
     straight = np.interp(t, found.t, found.y) if len(found.t) else np.zeros_like(t)
+    least, most = told - found.count / 2, told + found.count / 2
     part = _swinging(found, float(t[begins]))
     at, y = found.t[part], found.y[part]
     if len(at) < LEAST:
-        return Course(t, straight, float("nan"))
+        return Course(t, np.clip(straight, least, most), float("nan"))
     since = t - t[begins]
     shapes = np.array([np.ones_like(t), since, since**2 / 2, _summed(_summed(torque, t), t), _summed(straight, t)])
     here = np.array([np.interp(at, t, shape) for shape in shapes]).T
@@ -88,7 +89,7 @@ def course(found: Edges, t: Array, torque: Array, begins: int) -> Course:
         blur = np.hypot(speed * (t[1] - t[0]) / np.sqrt(12), BLUR * found.count)
     within = (t >= at[0]) & (t <= at[-1])
     angle = np.where(within, model + _stiff(at, y - here @ numbers, blur, t), straight)
-    return Course(t, angle, float(numbers[3]))
+    return Course(t, np.clip(angle, least, most), float(numbers[3]))
 
 
 def _stiff(at: Array, left: Array, blur: Array, t: Array) -> Array:

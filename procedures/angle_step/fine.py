@@ -17,7 +17,7 @@ from procedures.angle_step.steps import Done
 Array = npt.NDArray[np.float64]
 ANSWERS = 0.5  # of its greatest: the torque current that answers a step
 SWING_S = 5e-3  # a swing that ends near the band leaves it or does not: a jump of more
-QUANTILES = 41  # of a normal, by which an angle that is unsure may be off
+QUANTILES = 41  # by which an angle that is unsure may be off
 
 
 @dataclass(frozen=True)
@@ -36,12 +36,12 @@ class Fine:
     band: float
     answers: int
 
-    def settlings(self, unsure: float) -> Array:
-        """The settling time, s, by angles that are off by the quantiles of a normal of so much, rad: where a swing ends within
+    def settlings(self, unsure: float, dof: float = 1e6) -> Array:
+        """The settling time, s, by angles that are off by so much, rad, times the quantiles of t: where a swing ends within
         that of the band, some have it and some do not."""
         from scipy import special
 
-        off = unsure * special.ndtri((np.arange(QUANTILES) + 0.5) / QUANTILES)
+        off = unsure * special.stdtrit(dof, (np.arange(QUANTILES) + 0.5) / QUANTILES)
         return np.array([self.course.last_outside(self.size, self.band - by) for by in off]) - float(
             self.course.t[self.answers]
         )
@@ -54,7 +54,7 @@ def fine(done: Done, swing: Swing, settling: float, band: float, count: float) -
     start = done.target - done.move.step
     turns = 2 * np.pi * np.round((swing.angle[0] - start) / (2 * np.pi))
     found, answers = edges(swing.t, swing.angle, count).since(start + turns, way), answer(swing)
-    angle = course(found, swing.t, way * swing.torque, answers)
+    angle = course(found, swing.t, way * (swing.angle - start - turns), way * swing.torque, answers)
     low, high = angle.crossing(0.1 * size), angle.crossing(0.9 * size)
     if not math.isfinite(high) or float(swing.t[answers]) + settling + SWING_S > swing.t[-1]:
         return None

@@ -5,7 +5,8 @@ trembling at an edge, now on one side and now on the other. Then the edge says w
 pushed back as much as the share of the time on the other side makes good: with a push of D a count (kp, by what the torque
 current does), D (1 - f) on the upper side, where it is for a share f, and D f on the lower. For a time T away from the edge it
 goes off by a parabola, a T^2/12 in the mean; it may have been back in between where telemetry did not see it. When it goes on
-to the next edge is chance: where it came to this one not long ago, it might as well have come later.
+to the next edge is chance: where it is on one side all but always, no push is left that keeps it, and where it came to this
+edge not long ago, it might as well have come later.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import numpy as np
 from procedures.angle_step.response import TAIL_S
 from procedures.angle_step.steps import Done
 
+VERGE = 0.05  # of the time on one side: it may go on to the next edge or not
 BEFORE = 1.5  # of the time that is looked at: within so long it may have come from another edge
 TREMBLES = 0.01  # of a count: what a kick of the derivative moves it off the edge before the controller hears of it
 
@@ -46,6 +48,6 @@ def stands(done: Done, count: float, push: float) -> Stands:
     edge = (float(counts.min()) + 0.5) * count - done.target
     half = (above + below) / 2 + TREMBLES * count
     before = np.rint((move.angle[move.t > move.t[-1] - BEFORE * TAIL_S] + (done.target - move.step)) / count)
-    if half > count / 2 or np.ptp(before) > 1:
+    if half > count / 2 or np.ptp(before) > 1 or min(share, 1 - share) < VERGE:
         return Stands(edge, count / 2)
     return Stands(edge + (above - below) / 2, half)
