@@ -164,9 +164,9 @@ class ControllerCapture:
         period_ns, count = self._ticks.ns(period), len(next(iter(data.columns.values())))
         channels = tuple(ChannelInfo(name, c.unit) for name, c in layout.channels.items())
         self._recorder.stream(StreamLayout(data.stream, period_ns, channels))
-        steps = np.arange(count)
+        steps = period * np.arange(count)
         self._recorder.samples(SampleBlock(
-            data.stream, 0, (data.first_tick + period * steps).astype(np.uint64), data.start_ns + self._ticks.all_ns(period * steps),
+            data.stream, 0, (data.first_tick + steps).astype(np.uint64), data.start_ns + self._ticks.all_ns(steps),
             self._clock.now_ns(), 0, data.columns,
         ))  # fmt: skip
         self._recorder.event(
