@@ -168,7 +168,7 @@ def test_captures() -> None:
     batch = host.stream.feed(block(7, 1024, bytes(range(200))), 0)
     found = [piece_of(payload(one)) for one in batch]
     assert b"".join(p.data for p in found if p) == bytes(range(200))
-    assert [p.offset for p in found if p][0] == 1024
+    assert next(p.offset for p in found if p) == 1024
     told = host.ask("err 10 no capture", "CaptureAsk", token=8)[1]
     assert told["status"] == rig().messages.code("CaptureStatus", "status", "NO_CAPTURE")
 
