@@ -32,7 +32,9 @@ UNITS: dict[str, Unit] = {
     "N": Unit("N"), "kN": Unit("N", 1e3), "mN": Unit("N", 1e-3),
     "kg m": Unit("kg m"), "g mm": Unit("kg m", 1e-6), "m/(kg m)": Unit("m/(kg m)"), "um/(g mm)": Unit("m/(kg m)"),
     "N m^2/A^2": Unit("N m^2/A^2"), "N/(A m)": Unit("N/(A m)"),
-    "H": Unit("H"), "mH": Unit("H", 1e-3), "T": Unit("T"), "mT": Unit("T", 1e-3),
+    "H": Unit("H"), "mH": Unit("H", 1e-3), "uH": Unit("H", 1e-6), "µH": Unit("H", 1e-6), "Wb": Unit("Wb"),
+    "mWb": Unit("Wb", 1e-3), "F": Unit("F"), "uF": Unit("F", 1e-6), "µF": Unit("F", 1e-6),
+    "T": Unit("T"), "mT": Unit("T", 1e-3),
     "Ohm": Unit("Ohm"), "Ω": Unit("Ohm"), "mOhm": Unit("Ohm", 1e-3), "mΩ": Unit("Ohm", 1e-3),
     "A": Unit("A"), "mA": Unit("A", 1e-3), "V": Unit("V"), "mV": Unit("V", 1e-3), "W": Unit("W"), "kW": Unit("W", 1e3),
     "K": Unit("K"), "degC": Unit("K", 1.0, 273.15), "°C": Unit("K", 1.0, 273.15),
@@ -48,6 +50,8 @@ UNITS: dict[str, Unit] = {
     "A/rad": Unit("A/rad"), "A s/rad": Unit("A s/rad"), "A/(rad s)": Unit("A/(rad s)"), "A/s": Unit("A/s"),
     "N m": Unit("N m"), "Nm": Unit("N m"), "mN m": Unit("N m", 1e-3), "mNm": Unit("N m", 1e-3),
     "N m/A": Unit("N m/A"), "N m s/rad": Unit("N m s/rad"), "N s/m": Unit("N s/m"),
+    "N/(m s)": Unit("N/(m s)"), "N m/rad": Unit("N m/rad"), "N m/(rad s)": Unit("N m/(rad s)"),
+    "V/A": Unit("V/A"), "V/(A s)": Unit("V/(A s)"), "A/V": Unit("A/V"), "A/(V s)": Unit("A/(V s)"),
 }  # fmt: skip
 """1/min and U/min are turns of a shaft, as controllers write its speed. Of the two letters that look alike, `µ` is the micro
 sign, which cp1252 has; the Greek one is read as that."""

@@ -230,8 +230,9 @@ class ControllerCapture:
         return WAITING * (length - min(reply["samples"], reply["trigger"])) * reply["divider"] * self._tick_s
 
     def _ask(self, message: str, values: dict[str, float]) -> dict[str, float]:
-        full, what = {**values, "session": self._session.number}, "the state of the capture"
-        return self._dialogue.ask(message, full, "CaptureStatus", what, self._wait)
+        owned = any(s.name == "session" for s in self._rig.messages[message].signals)
+        full = {**values, "session": self._session.number} if owned else values
+        return self._dialogue.ask(message, full, "CaptureStatus", "the state of the capture", self._wait)
 
     def _said(self, reply: dict[str, float]) -> tuple[str, str]:
         message = self._rig.messages["CaptureStatus"]

@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from bench import units
-from bench.rigfile.capture import MESSAGES, CaptureSpec
+from bench.rigfile.capture import BY_BLOCKS, MESSAGES, CaptureSpec
 from bench.rigfile.check_binding import Found, multiplexed
 from bench.rigfile.messages import MessageMap
 
 
-def problems_of(spec: CaptureSpec, messages: MessageMap) -> Iterator[Found]:
-    """Key, found and expected of what is wrong with the table `capture`."""
-    if missing := [name for name in MESSAGES if name not in messages.messages]:
+def problems_of(spec: CaptureSpec, messages: MessageMap, *, blocks: bool = True) -> Iterator[Found]:
+    """Key, found and expected of what is wrong with the table `capture`; `blocks`: it comes in blocks, not in pieces."""
+    needed = (name for name in MESSAGES if blocks or name not in BY_BLOCKS)
+    if missing := [name for name in needed if name not in messages.messages]:
         yield "capture", f"no message {', '.join(missing)} in the DBC", "the messages of docs/reference/captures.md"
     yield from multiplexed((("capture", name) for name in MESSAGES), messages)
     taken: dict[int, str] = {}
