@@ -231,8 +231,8 @@ class ControllerCapture:
         return WAITING * (length - min(reply["samples"], reply["trigger"])) * reply["divider"] * self._tick_s
 
     def _ask(self, message: str, values: dict[str, float]) -> dict[str, float]:
-        full, what = {**values, "session": self._session.number}, "the state of the capture"
-        return self._dialogue.ask(message, full, "CaptureStatus", what, self._wait)
+        full = {**values, "session": self._session.number}
+        return self._dialogue.ask(message, full, "CaptureStatus", "the state of the capture", self._wait)
 
     def _said(self, reply: dict[str, float]) -> tuple[str, str]:
         message = self._rig.messages["CaptureStatus"]
