@@ -93,6 +93,15 @@ class Plant:
         """Give the firmware a command: 0 done, 1 not in this state, 2 the mover stands too far off the middle to be lifted."""
         return int(_lib.lira_command(self._p, self._c, self._s, COMMANDS.index(name)))
 
+    def power_on(self) -> None:
+        """The firmware starts anew: OFF, without a fault, nothing added to a reference."""
+        if self.command("clear"):
+            self.command("stop")
+        self._s.mode = STATES.index("OFF")
+        self._c.inject_axis = -1.0
+        for k in range(len(DQ)):
+            self._s.manual[k] = 0.0
+
     def beat(self) -> None:
         """A heartbeat of the host."""
         self._s.heard = self._s.tick
