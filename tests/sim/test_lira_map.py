@@ -1,0 +1,67 @@
+"""The rig file `lira`: its map by hand, its parameters and captures as the firmware has them."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import pytest
+
+from bench.link.codec import encode
+from bench.rigfile import RigFile, load_rig
+from bench.rigfile.check import problems_of
+from sim_backend.machines.lira.params import ControlParams
+from sim_backend.machines.lira.plant import DQ
+from sim_backend.machines.lira.settings import MEASUREMENTS, SETTINGS
+
+AXES = ("x1", "x2", "y1", "y2", "z", "gamma")
+
+
+@cache
+def rig() -> RigFile:
+    return load_rig("lira")
+
+
+def test_the_rig_file_is_sound() -> None:
+    assert [str(p) for p in problems_of(rig())] == []
+
+
+def test_telemetry_byte_by_byte() -> None:
+    """48 bytes, little endian: 1 um is 100, 8 mm 8000, a quarter turn 16384, 3 A 3000, 400 V 40000, 20 ms 20."""
+    values = {"seq": 0x0102, "tick": 0x020304, "x1": 1e-6, "x2": -1e-6, "y1": 0.3e-6, "z": 8e-3, "gamma": math.pi / 2,
+              "i_d_R1": 3.0, "i_q_R1": -1.0, "i_q_L": 1.5, "u_dc": 400.0, "state": 4, "limited": 3,
+              "host_age": 0.02}  # fmt: skip
+    first, last = "0201 04030200 6400 9cff 1e00 0000 401f 0040 b80b 18fc", "dc05 409c 0400 0000 0300 1400"
+    expected = first + 7 * "0000" + last
+    message = rig().messages["Telemetry"]
+    assert encode(message, values) == bytes.fromhex(expected)
+    assert (message.length, message.period_s, message.identifier) == (48, 0.002, 0x100)
+    heartbeat = rig().messages["Heartbeat"]
+    assert encode(heartbeat, {"counter": 0x1234}) == bytes.fromhex("00000000 3412 0000")
+
+
+def test_no_message_has_an_owner() -> None:
+    """Who types on a command line is not asked for a name."""
+    signals = {s.name for m in rig().messages.messages.values() for s in m.signals}
+    assert not signals & {"session", "session8"}
+    assert not {"Claim", "Owner"} & rig().messages.messages.keys()
+
+
+def test_parameters_are_those_of_the_command_line() -> None:
+    control = ControlParams()
+    told = [(n, p.index, p.default, p.low, p.high) for n, p in rig().parameters.items() if (p.index or 0) < 100]
+    assert [t[:2] for t in told] == [(s.name, k) for k, s in enumerate(SETTINGS, 1)]
+    for (_, _, *numbers), s in zip(told, SETTINGS, strict=True):
+        assert numbers == pytest.approx([getattr(control, s.field), s.low, s.high], rel=1e-8), s.name
+    later = {p.index: n for n, p in rig().parameters.items() if (p.index or 0) >= 100}
+    assert [later[100 + k] for k in range(6)] == [f"ref_{a}" for a in AXES]
+    assert [later[110 + k] for k in range(10)] == [f"step_{name}" for name in DQ]
+
+
+def test_captures_are_the_firmwares_measurements() -> None:
+    spec = rig().capture
+    assert spec is not None
+    told = [(n, c.index, c.type, c.scale, c.unit) for n, c in spec.channels.items()]
+    assert told[:52] == [(m.name, k, "i16", m.lsb, m.unit) for k, m in enumerate(MEASUREMENTS)]
+    assert told[52:] == [(f"i_{n}", 52 + k, "i16", 1e-3, "A") for k, n in enumerate(DQ)]
+    assert spec.memory_bytes == 32 << 20
