@@ -40,6 +40,29 @@ def test_telemetry_byte_by_byte() -> None:
     assert encode(heartbeat, {"counter": 0x1234}) == bytes.fromhex("00000000 3412 0000")
 
 
+def told(toml: str) -> list[str]:
+    return [str(p) for p in problems_of(RigFile.parse(toml, rig().dbc_text, "lira.toml"))]
+
+
+def test_a_bus_needs_the_messages_of_blocks() -> None:
+    """In pieces, as over this rig's own link, a capture comes without them."""
+    bus = rig().toml_text.replace(
+        f'url = "{rig().link.url}"', 'url = "slcan:/dev/ttyACM0"\nbitrate = 1e6\ndata_bitrate = 5e6'
+    )
+    assert [p for p in told(bus) if "capture:" in p] == [
+        "lira.toml: capture: found no message CaptureFlow, CaptureBlock in the DBC; expected the messages of "
+        "docs/reference/captures.md"
+    ]
+
+
+@pytest.mark.parametrize(("measures", "turned"), [("angle", False), ("stroke", True)])
+def test_what_holds_an_angle_is_not_turned(measures: str, turned: bool) -> None:
+    """A motor that nothing tells an angle of may spin: STOP, and a speed that is watched."""
+    toml = rig().toml_text.replace('measures = "angle"', f'measures = "{measures}"')
+    wanted = ("commands.STOP: found", "mark.speed: found nothing")
+    assert [any(w in p for p in told(toml)) for w in wanted] == [turned, turned]
+
+
 def test_no_message_has_an_owner() -> None:
     """Who types on a command line is not asked for a name."""
     signals = {s.name for m in rig().messages.messages.values() for s in m.signals}

@@ -217,7 +217,7 @@ def test_with_wrong_wiring_the_mission_ends(planted: dict[str, float]) -> None:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_what_is_made_is_lifted_from_its_rings(seed: int) -> None:
-    """As a controller does it: pulse-width modulation on, turned to 0, bearings on, crawl, gate."""
+    """As a controller does it: currents on, turned to 0, bearings on, crawl, gate."""
     truth = draw(rig(), seed, {"reduced": 1})
     host = Host(truth.machine.make(truth.plant, truth.noise, 1))
     host.wait(0.3)
