@@ -18,6 +18,7 @@ from sim_backend.endpoint import SimulatedRig
 from sim_backend.machine import Truth
 from sim_backend.machines.lira.machine import DEFECTS, LIRA, Built
 from sim_backend.machines.lira.params import ControlParams, PlantParams
+from sim_backend.machines.lira.plant import TRACE, Plant, ideal
 from sim_backend.truth import draw, nominal
 
 AXES = ("x1", "x2", "y1", "y2", "z", "gamma")
@@ -140,16 +141,34 @@ def test_truth_can_be_asked_for() -> None:
     assert not drawn(1).plant.reduced
 
 
-@pytest.mark.parametrize(("place", "at"), [("x1", 0.045), ("x2", -0.045), ("y1", 0.045), ("y2", -0.045)])
-def test_the_zero_current_point_is_where_the_magnets_pull_nowhere(place: str, at: float) -> None:
-    """A mover put there, read without noise: the pull of both planes is none."""
-    p = drawn(5).plant.plant
-    q, k = drawn(5).quantities, "xxyy".index(place[0])
-    ends = [-p.centre[k], -p.centre[k + 1]]
-    straight = np.polyfit([p.bearing_plane, -p.bearing_plane], ends, 1)
-    true = np.polyval(straight, math.copysign(p.sensor_plane, at))
-    n = ("x1", "x2", "y1", "y2").index(place)
-    assert q[f"zero_current@{place}"] == pytest.approx(p.position_gain[n] * true + p.position_offset[n], abs=1e-15)
+@pytest.mark.parametrize("seed", range(3))
+def test_at_the_zero_current_points_the_bearings_carry_the_weight_alone(seed: int) -> None:
+    """Held there at z_mid, with sensors that keep their gains and zeros but no noise, and nothing that turns with the mover."""
+    found = drawn(seed)
+    p = found.plant.plant
+    still = replace(ideal(p), position_gain=p.position_gain, position_offset=p.position_offset, uneven=(0.0, 0.0), runout=0.0,
+                    eccentric=(0.0, 0.0), zero_ra=(0.0, 0.0))  # fmt: skip
+    plant = flying(still, reduced=True, z=p.middle, observer=2.0)
+    for name in ("x1", "x2", "y1", "y2"):
+        plant.refer(name, found.quantities[f"zero_current@{name}"])
+    rest = plant.run(1.0)[-100:].mean(axis=0)
+    across, up = ([rest[TRACE.index(f"i_{way}_B{k}")] for k in (1, 2)] for way in "dq")
+    assert across == pytest.approx([0.0, 0.0], abs=2e-3)  # 20 nm of the pull
+    lifted = sum(k * i for k, i in zip(p.bearing_constant, up, strict=True))
+    assert lifted == pytest.approx(p.mass * p.gravity, rel=1e-3)
+    assert max(abs(x) for x in rest[RADIAL]) > 1e-6  # and not in the rings' middle
+
+
+def test_lambda_is_how_the_mover_leaves_the_middle() -> None:
+    """Both planes let go at once from the middle of their pull, 10 nm off, currents off: cosh(lambda t)."""
+    p = drawn(2).plant.plant
+    alone = replace(ideal(p), clearance=1.0, clearance_out=1.0, gravity=0.0, centre=(0.0,) * 4, uneven=(0.0, 0.0),
+                    pull=(sum(p.pull) / 2,) * 2, eccentric=(0.0, 0.0), emf=0.0, middle=0.0)  # fmt: skip
+    plant = Plant(alone, reduced=True)
+    plant.put(x=1e-8)
+    x = plant.run(5e-3)[:, RADIAL[0]]
+    rate = np.arccosh((x[2:] + x[:-2]) / (2 * x[1:-1])) * 35e3  # of cosh, from row to row
+    assert rate[10:] == pytest.approx(drawn(2).quantities["lambda"], rel=1e-4)
 
 
 def test_what_the_engine_plants_is_there() -> None:
