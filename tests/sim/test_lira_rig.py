@@ -163,7 +163,7 @@ def test_lambda_is_how_the_mover_leaves_the_middle() -> None:
     """Both planes let go at once from the middle of their pull, 10 nm off, currents off: cosh(lambda t)."""
     p = drawn(2).plant.plant
     alone = replace(ideal(p), clearance=1.0, clearance_out=1.0, gravity=0.0, centre=(0.0,) * 4, uneven=(0.0, 0.0),
-                    pull=(sum(p.pull) / 2,) * 2, eccentric=(0.0, 0.0), emf=0.0, middle=0.0)  # fmt: skip
+                    pull=(sum(p.pull) / 2,) * 2, cogging_force=0.0, cogging_force_2=0.0, middle=0.0)  # fmt: skip
     plant = Plant(alone, reduced=True)
     plant.put(x=1e-8)
     x = plant.run(5e-3)[:, RADIAL[0]]
