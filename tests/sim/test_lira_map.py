@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from functools import cache
 
 import pytest
@@ -57,10 +58,13 @@ def test_a_bus_needs_the_messages_of_blocks() -> None:
 
 @pytest.mark.parametrize(("measures", "turned"), [("angle", False), ("stroke", True)])
 def test_what_holds_an_angle_is_not_turned(measures: str, turned: bool) -> None:
-    """A motor that nothing tells an angle of may spin: STOP, and a speed that is watched."""
+    """A motor that nothing tells an angle of may spin: its controller must know STOP."""
     toml = rig().toml_text.replace('measures = "angle"', f'measures = "{measures}"')
-    toml = toml.replace('[mark]\nspeed = "speed"\n', "")
-    assert any("mark.speed: found nothing" in p for p in told(toml)) == turned
+    toml = toml.replace('[mark]\nspeed = "speed"\n', "").replace('STOP = "halt"\n', "")
+    toml = re.sub(r"^speed = .*\n", "", toml, flags=re.MULTILINE)
+    dbc = rig().dbc_text.replace(' 5 "STOP"', "")
+    found = [str(p) for p in problems_of(RigFile.parse(toml, dbc, "lira.toml"))]
+    assert any("commands.STOP: found" in p for p in found) == turned
 
 
 def test_no_message_has_an_owner() -> None:
