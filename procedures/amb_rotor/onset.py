@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
-from procedures.amb_rotor.conventions import AmbRotor
+from procedures.amb_rotor.machine import AmbRotor
 
 Array = npt.NDArray[np.float64]
 ONSET, BEFORE_S = 4, 0.03  # periods of the telemetry; s

@@ -17,7 +17,7 @@ from bench.recording import Recording, Step
 from bench.rigfile import RigFile
 from bench.rigfile.roles import STATUS
 from bench.uncertainty import Estimate, Influence, propagate
-from procedures.amb_rotor.conventions import AmbRotor
+from procedures.amb_rotor.machine import AmbRotor
 from procedures.shared import signals
 from procedures.spindown import fit
 from procedures.spindown.checks import drives_on

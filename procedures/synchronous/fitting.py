@@ -9,7 +9,8 @@ from bench.errors import BenchError
 from bench.rigfile import RigFile
 from bench.rigfile.capture import Layout
 from bench.units import RPM
-from procedures.amb_rotor.conventions import AmbRotor, conventions
+from procedures.amb_rotor.conventions import conventions
+from procedures.amb_rotor.machine import AmbRotor
 from procedures.shared.limits import landing_speed
 from procedures.shared.rates import of_rate, rate_of
 from procedures.synchronous.bearings import has_model

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from bench.errors import AnalysisError
 from bench.recording import Step
-from procedures.amb_rotor.conventions import AmbRotor
+from procedures.amb_rotor.machine import AmbRotor
 from procedures.amb_rotor.onset import onset
 
 Array = npt.NDArray[np.float64]

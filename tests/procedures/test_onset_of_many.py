@@ -14,8 +14,8 @@ TICK, LAG, ANSWERS, PERIOD = 5e-5, 1.5e-4, 400, 1e-3
 
 
 def answers(jump: float, begun: float, seed: int, ticks: int) -> tuple[Array, Array]:
-    """Samples (n,) s and A of a loop whose answer to a jump crosses zero 3 ms later; 1 A of noise in a sample, of which half the
-    variance is one value for each answer."""
+    """Samples (n,) s and A of a loop whose answer to a jump crosses zero 3 ms later; 1 A of noise in a sample, of which half
+    the variance is one value for each answer."""
     rng, t, current = np.random.default_rng(seed), [], []
     for _ in range(ANSWERS):
         at = np.arange(-4e-3, 6e-3, PERIOD) + rng.uniform(0, PERIOD)
