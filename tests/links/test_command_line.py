@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import re
 import signal
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -57,7 +58,8 @@ def test_half_a_second_of_every_measurement_comes_whole(tmp_path: Path, faults: 
                 capture.wait(60.0)
                 begun = time.monotonic()
                 data = capture.upload()
-                print(f"{kind} {faults}: {time.monotonic() - begun:.2f} s; the wire alone takes {WIRE_S:.2f} s")
+                took = time.monotonic() - begun
+                sys.stderr.write(f"{kind} {' '.join(faults)}: {took:.2f} s; the wire alone takes {WIRE_S:.2f} s\n")
                 controller.land()
                 controller.disable()
             assert len(data.columns) == 52
