@@ -140,13 +140,18 @@ def _paired(identity: str, flight: Flight, plan: Plan, channel: str) -> Estimate
 
 
 def gate_margin(flight: Flight, rig: RigFile, plan: Plan, probe: str, rests: Sequence[Array]) -> Estimate | None:
-    """What the gate leaves; None where the capture of the lift does not hold its time."""
-    x = gated(flight, rig, radial(rig)[probe])
-    if x is None:
+    """What the gate leaves; None where the capture of the lift does not hold its time. Telemetry tells up to a period late that
+    the gate passed, and what a lift leaves decays: the time it began at matters."""
+    late, early = (gated(flight, rig, radial(rig)[probe], by) for by in (0.0, period_of(flight)))
+    if late is None or early is None:
         return None
     limit, _ = gate_of(rig)
-    found = fit.without_noise(x, rests, plan.smooth_s * plan.rate_hz, fit.largest_distance)
-    return limit - _largest(f"gate_margin/{probe}", found)
+    width, of = plan.smooth_s * plan.rate_hz, fit.largest_distance
+    ends = [fit.without_noise(x, rests, width, of) for x in (late, early)]
+    u = abs(ends[0].value - ends[1].value) / 2 / math.sqrt(3)
+    told = Influence(f"telemetry/{probe}/gate", "when the gate's time began", u, "m", "B", "rectangular")
+    found = Largest(*((getattr(ends[0], k) + getattr(ends[1], k)) / 2 for k in ("value", "bias", "u", "bent")))
+    return limit - _largest(f"gate_margin/{probe}", found) + Estimate.of(0.0, told)
 
 
 def gate_of(rig: RigFile) -> tuple[float, float]:
@@ -155,12 +160,20 @@ def gate_of(rig: RigFile) -> tuple[float, float]:
     return rig.parameters[at.gate].default, rig.parameters[at.gate_time].default
 
 
-def gated(flight: Flight, rig: RigFile, channel: str) -> Array | None:
-    """Readings (n,) over the gate's time before the mover counted as lifted."""
+def gated(flight: Flight, rig: RigFile, channel: str, before_s: float = 0.0) -> Array | None:
+    """Readings (n,) over the gate's time before telemetry told that the mover is lifted, or so much earlier."""
     passed, lift, (_, seconds) = flight.since("LEVITATED"), flight.lift, gate_of(rig)
-    if passed is None or lift is None or not lift.t[0] <= passed - seconds <= passed <= lift.t[-1]:
+    if passed is None or lift is None:
+        return None
+    passed -= before_s
+    if not lift.t[0] <= passed - seconds <= passed <= lift.t[-1]:
         return None
     return lift.columns[channel][lift.cut(passed - seconds, passed)]
+
+
+def period_of(flight: Flight) -> float:
+    """Of the telemetry, s: a state is told up to so much late."""
+    return float(np.median(np.diff(flight.telemetry["t"])))
 
 
 def _settled(flight: Flight, rig: RigFile, plan: Plan) -> dict[tuple[str, str], Estimate]:
@@ -192,8 +205,6 @@ def _lift_time(flight: Flight, rig: RigFile) -> dict[tuple[str, str], Estimate]:
     begun, passed = flight.since("LIFTING"), flight.since("LEVITATED")
     if begun is None or passed is None:
         return {}
-    period = float(np.median(np.diff(flight.telemetry["t"])))
-    seen = Influence(
-        "telemetry/lift_time", "telemetry's period, at both ends", period / math.sqrt(6), "s", "B", "triangular"
-    )
+    off = period_of(flight) / math.sqrt(3)  # not random: the host's commands may keep step with telemetry
+    seen = Influence("telemetry/lift_time", "telemetry's period", off, "s", "B", "rectangular")
     return {("lift_time", ""): Estimate.of(passed - begun, seen)}

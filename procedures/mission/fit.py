@@ -44,7 +44,7 @@ def swing(x: Array) -> float:
 
 def smoothed(x: Array, width: float) -> Array:
     """`x` (n,) under a Gauss window of so many samples' standard deviation."""
-    out: Array = gaussian_filter1d(np.asarray(x, np.float64), width, mode="nearest")
+    out: Array = gaussian_filter1d(np.asarray(x, np.float64), width, mode="reflect")
     return out
 
 

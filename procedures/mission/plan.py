@@ -31,4 +31,4 @@ class Plan(BenchPlan):
     captures: int = Field(1, ge=1)  # into which the repeats are divided; each is uploaded while the mover is held
     rate_hz: float = Field(35e3, gt=1e3)
     currents: bool = True  # capture the bearings' currents, too
-    smooth_s: float = Field(2e-4, gt=0)  # standard deviation of the Gauss window that noise is averaged with
+    smooth_s: float = Field(6e-4, gt=0)  # standard deviation of the Gauss window that noise is averaged with

@@ -15,6 +15,8 @@ from sim_backend.machines.lira.operator import Attendant
 from sim_backend.machines.lira.params import COILS, ControlParams, Each, PlantParams
 from sim_backend.machines.lira.plant import DQ, TICKS_S, Plant
 from sim_backend.machines.lira.settings import BY_NAME
+from sim_backend.machines.lira.truth_mission import mission
+from sim_backend.motion import Motions
 
 HALVES: Final = range(1, COILS + 1)
 """Coils and half-bridges by their numbers: coil k is driven by half-bridge k."""
@@ -244,6 +246,7 @@ LIRA = Machine(
     controls=frozenset(BY_NAME) | SENT,
     tick_s=1 / TICKS_S,
     period_s=PERIOD_S,
+    motions=Motions(mission=mission),
     controller=SpokenController,
     served=LineController,
 )
