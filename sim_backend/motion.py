@@ -165,9 +165,10 @@ class SpeedsAsked:
 
 @dataclass(frozen=True)
 class MissionAsked:
-    """A mission: `settings` as those of steps. Times from the firmware's start on, s: when it is switched `on_s` and lifts,
-    `lift_s`, from where it is `lying`, m by channel, as probes read it; `commands` (when, "z" or "angle", to where, rate, rise) until `end_s`; `repeats` (begin, end), and `rests` (begin,
-    end, which place). `places` are what both are called, `sent` where the mover is sent, m and rad. The gate, m, and its time."""
+    """A mission: `settings` as those of steps. Times from the firmware's start on, s: when it is switched on, `on_s`, and
+    lifts, `lift_s`, from where it is `lying`, m by channel, as probes read it; `commands` (when, "z" or "angle", to where, rate
+    and rise) until `end_s`; `repeats` (begin, end), and `rests` (begin, end, which place). `places` are what both are called,
+    `sent` where the mover is sent, m and rad. The gate, m, and its time, s."""
 
     settings: Numbers
     on_s: float

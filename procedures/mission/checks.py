@@ -65,7 +65,7 @@ def of_results(told: Told, flight: Flight, rig: RigFile, plan: Plan) -> Iterator
         text = f"one repeat stands out: {name} of {probe} is that of this one. Did something push the mover?"
         yield Finding("repeat-stands-out", text, probe, Effect.NOTE)
     if any(gated(flight, rig, channel) is None for channel in radial(rig).values()):
-        text = f"the gate's time lies outside the {plan.lift_s:g} s that were captured: no gate_margin. Capture longer (lift_s)."
+        text = f"the gate's time lies outside the {plan.lift_s:g} s captured: no gate_margin. Capture longer (lift_s)."
         yield Finding("gate-not-captured", text, "gate", Effect.INDETERMINATE, ("gate_margin",))
     for probe, channel in radial(rig).items():
         far, seen = _telemetry(flight, channel), told.largest[probe]

@@ -55,7 +55,7 @@ def _readings(flight: Flight, rig: RigFile) -> Figure:
     caption = ("Radial readings during the moves, noise included, at full rate (least and largest of each stretch). "
                "Integrators bring them back to zero at either place.")  # fmt: skip
     gate, _ = gate_of(rig)
-    lines = (("gate", gate * UM), ("", -gate * UM))
+    lines = (("gate", gate * UM), ("gate, below", -gate * UM))
     return Figure("readings", "Readings during the moves", caption, "time / s", "reading / µm", series, lines=lines)
 
 
@@ -77,14 +77,14 @@ def _lift(flight: Flight, rig: RigFile, plan: Plan) -> Figure:
     passed = flight.since("LEVITATED")
     reach = max(float(np.abs(s.y).max()) for s in series)
     if passed is not None:
-        for t in (passed - seconds, passed):
-            series += (Series("", np.array([t, t]), np.array([-reach, reach]), "guide"),)
+        for name, t in (("gate's time begins", passed - seconds), ("it ends", passed)):
+            series += (Series(name, np.array([t, t]), np.array([-reach, reach]), "guide"),)
     at = motion(rig)
     along = Series("along", *_shown(flight.lift, at.place_channel, 1e3))
     below = Figure("lift-place", "", "", "time / s", "place / mm", (along,))
     caption = ("Radial readings during the lift; all have to stay within the gate between the dashed lines. Before, the mover "
                "lies in its rings.")  # fmt: skip
-    lines = (("gate", gate * UM), ("", -gate * UM))
+    lines = (("gate", gate * UM), ("gate, below", -gate * UM))
     return Figure("lift", "Lift and gate", caption, "time / s", "reading / µm", series, lines=lines, below=below)
 
 
@@ -92,7 +92,7 @@ def _currents(flight: Flight, rig: RigFile) -> Figure:
     series = tuple(Series(c, *_joined(flight.pieces, c, 1.0)) for c in motion(rig).currents)
     limit = rig.envelope.max_current_A
     caption = "Currents of the bearings as the firmware has them; the lines are what the envelope allows a coil."
-    lines = (("envelope", limit), ("", -limit))
+    lines = (("envelope", limit), ("envelope, below", -limit))
     return Figure("currents", "Bearing currents", caption, "time / s", "current / A", series, lines=lines)
 
 

@@ -1,5 +1,5 @@
-"""What a mission truly is on a drawn machine: the same machine and firmware, flown by the same commands with sensors that have no
-noise and no rounding."""
+"""What a mission truly is on a drawn machine: the same machine and firmware, flown by the same commands with sensors that have
+no noise and no rounding."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def _flown(drawn: Truth, asked: MissionAsked) -> tuple[float, Array, Array] | No
         if not _told(plant, what, where):
             return None
     whole = np.concatenate(rows)
-    t = np.arange(len(whole)) * STEP_S
+    t = np.arange(float(len(whole))) * STEP_S
     held = np.flatnonzero(whole[:, KEPT.index("mode")] == STATES.index("LEVITATED"))
     if not len(held) or plant.state != "LEVITATED":
         return None
