@@ -4,7 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Protocol
+from typing import Final, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+WHOLE_NS: Final = 1e-3
+"""So far from a whole number of nanoseconds a tick is one all the same."""
 
 
 class Clock(Protocol):
@@ -17,6 +23,34 @@ class Clock(Protocol):
     def sleep(self, seconds: float) -> None:
         """Let that much bench time pass."""
         ...
+
+
+class TickClock:
+    """A device's ticks as nanoseconds. A tick need not be a whole number of them (280 kHz: 25 us are seven).
+
+    Args:
+        tick_s: of the device.
+    """
+
+    def __init__(self, tick_s: float) -> None:
+        exact = tick_s * 1e9
+        self.tick_ns = round(exact) if abs(exact - round(exact)) < WHOLE_NS else exact
+
+    def ns(self, ticks: int) -> int:
+        """So many ticks, ns."""
+        return round(ticks * self.tick_ns)
+
+    def all_ns(self, ticks: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+        """So many ticks each, ns (n,)."""
+        if isinstance(self.tick_ns, int):
+            return np.asarray(ticks * self.tick_ns, np.int64)
+        out: npt.NDArray[np.int64] = np.rint(ticks * self.tick_ns).astype(np.int64)
+        return out
+
+    def ticks(self, seconds: float) -> float:
+        """Ticks in a time; whole where it is a whole number of them."""
+        exact = seconds * 1e9 / self.tick_ns
+        return float(round(exact)) if abs(exact - round(exact)) < 1e-6 * max(exact, 1.0) else exact
 
 
 class WallClock:

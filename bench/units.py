@@ -47,7 +47,10 @@ UNITS: dict[str, Unit] = {
     "A/m": Unit("A/m"), "A/mm": Unit("A/m", 1e3), "A s/m": Unit("A s/m"), "A/(m s)": Unit("A/(m s)"),
     "A/rad": Unit("A/rad"), "A s/rad": Unit("A s/rad"), "A/(rad s)": Unit("A/(rad s)"), "A/s": Unit("A/s"),
     "N m": Unit("N m"), "Nm": Unit("N m"), "mN m": Unit("N m", 1e-3), "mNm": Unit("N m", 1e-3),
-    "N m/A": Unit("N m/A"), "N m s/rad": Unit("N m s/rad"), "N s/m": Unit("N s/m"),
+    "N m/A": Unit("N m/A"), "N m s/rad": Unit("N m s/rad"), "N s/m": Unit("N s/m"), "N/(m s)": Unit("N/(m s)"),
+    "N m/rad": Unit("N m/rad"), "N m/(rad s)": Unit("N m/(rad s)"),
+    "V/A": Unit("V/A"), "A/V": Unit("A/V"), "V/(A s)": Unit("V/(A s)"), "A/(V s)": Unit("A/(V s)"), "Wb": Unit("Wb"),
+    "uH": Unit("H", 1e-6), "µH": Unit("H", 1e-6), "F": Unit("F"), "uF": Unit("F", 1e-6), "µF": Unit("F", 1e-6),
 }  # fmt: skip
 """1/min and U/min are turns of a shaft, as controllers write its speed. Of the two letters that look alike, `µ` is the micro
 sign, which cp1252 has; the Greek one is read as that."""

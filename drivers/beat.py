@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final, Literal
 
 from bench.errors import ConfigError
-from bench.wire import packet, slcan
+from bench.wire import commandline, packet, slcan
 
 FD: Final = 2
 """Flag of a frame: CAN FD. The same as in bench.link.frames, which would bring numpy along."""
@@ -66,11 +66,12 @@ class Beat:
 class WriterSpec:
     """How heartbeats reach the wire.
 
-    `slcan` and `packet` write to the descriptor `fileno`, `brs` with bit-rate switch; `python-can` opens a second bus
-    from `arguments` (of `can.Bus`, JSON); with `none` no other process reaches it.
+    `slcan`, `lines` and `packet` write to the descriptor `fileno`, `brs` with bit-rate switch; `python-can` opens a second bus
+    from `arguments` (of `can.Bus`, JSON); with `none` no other process reaches it. Of `lines`, a command line, `arguments` say
+    the line of a heartbeat and the places of its counter's bits in the message.
     """
 
-    format: Literal["slcan", "packet", "python-can", "none"]
+    format: Literal["slcan", "packet", "lines", "python-can", "none"]
     fileno: int | None = None
     brs: bool = False
     arguments: Mapping[str, Any] = field(default_factory=dict)
@@ -78,7 +79,7 @@ class WriterSpec:
     @property
     def bytewise(self) -> bool:
         """Whether it writes to a byte stream, which can have one writer only."""
-        return self.format in ("slcan", "packet")
+        return self.format in ("slcan", "packet", "lines")
 
 
 class Schedule:
@@ -112,6 +113,8 @@ class Encoder:
 
     def __init__(self, spec: WriterSpec) -> None:
         self._packets, self._brs = spec.format == "packet", spec.brs
+        self._line: str = spec.arguments["heartbeat"] if spec.format == "lines" else ""
+        self._places: Sequence[int] = spec.arguments["places"] if self._line else ()
         self._sequence = 0
 
     def encode(self, frame: Frame) -> bytes:
@@ -123,6 +126,9 @@ class Encoder:
         identifier, payload, flags = frame
         if flags & RAW:
             return payload
+        if self._line:
+            count = sum(1 << n for n, at in enumerate(self._places) if payload[at >> 3] >> (at & 7) & 1)
+            return commandline.beat(self._line.replace("{counter}", str(count)))
         if self._packets:
             return packet.packet(self._sequence, 0, [(identifier, payload)])
         return slcan.line(identifier, payload, fd=bool(flags & FD), brs=self._brs)

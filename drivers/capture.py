@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from bench.clock import Clock
+from bench.clock import Clock, TickClock
 from bench.errors import BenchError
 from bench.link.session import Session
 from bench.link.telemetry import TelemetryDecoder
@@ -37,6 +37,7 @@ class ControllerCapture:
         self._rig, self._spec, self._dialogue, self._uploads = rig, spec, dialogue, upload
         self._session, self._telemetry, self._clock, self._wait = session, telemetry, clock, wait
         self._tick_s = rig.devices["controller"].tick_s
+        self._ticks = TickClock(self._tick_s)
         self._armed: tuple[Layout, Trigger, int] | None = None  # the last one, and its number
         self._recorder: Recorder | None = None
         self._recorded = 0
@@ -160,12 +161,12 @@ class ControllerCapture:
         if self._recorder is None:
             return
         self._recorded += 1
-        period_ns, count = round(period * self._tick_s * 1e9), len(next(iter(data.columns.values())))
+        period_ns, count = self._ticks.ns(period), len(next(iter(data.columns.values())))
         channels = tuple(ChannelInfo(name, c.unit) for name, c in layout.channels.items())
         self._recorder.stream(StreamLayout(data.stream, period_ns, channels))
         steps = np.arange(count)
         self._recorder.samples(SampleBlock(
-            data.stream, 0, (data.first_tick + period * steps).astype(np.uint64), data.start_ns + period_ns * steps,
+            data.stream, 0, (data.first_tick + period * steps).astype(np.uint64), data.start_ns + self._ticks.all_ns(period * steps),
             self._clock.now_ns(), 0, data.columns,
         ))  # fmt: skip
         self._recorder.event(

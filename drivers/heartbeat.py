@@ -50,7 +50,7 @@ class HeartbeatProcess:
         _check(beat, writer)
         self.owns_port = writer.bytewise
         """Whether it is the one writer of the wire: frames must then go through `send`."""
-        self._takes_lines = writer.format == "slcan"
+        self._takes_lines = writer.format in ("slcan", "lines")
         self._lock = threading.Lock()
         self._fault: str | None = None
         self.unpreferred = ""
@@ -97,15 +97,17 @@ class HeartbeatProcess:
         self._send(records.tobytes())
 
     def send_bytes(self, data: bytes) -> None:
-        """Write whole SLCAN lines that are no frames (a request for the status), in order with the frames.
+        """Write whole lines that are no frames (a request for an SLCAN adapter's status, a command line), in order with the
+        frames.
 
         Raises:
             LinkError: as `send`.
-            ValueError: over 64 bytes, or the port is no SLCAN port.
+            ValueError: no whole lines, or the port takes none.
         """
-        if not self._takes_lines or len(data) > 64:
-            raise ValueError(f"{len(data)} bytes: expected at most 64, of whole lines, for an SLCAN port")
-        self._send(RECORD.pack(0, RAW, len(data), data))
+        if not self._takes_lines or not data.endswith((b"\r", b"\n")):
+            raise ValueError(f"{data[-20:]!r}: expected whole lines, for a port that takes lines")
+        parts = [data[k : k + 64] for k in range(0, len(data), 64)]
+        self._send(b"".join(RECORD.pack(0, RAW, len(part), part) for part in parts))
 
     def renew_lease(self) -> None:
         """Heartbeats go on for another lease from now. Never waits."""

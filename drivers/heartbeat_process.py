@@ -122,6 +122,7 @@ class Session:
 
     def __init__(self, lines: portable.Lines, data: socket.socket, pacemaker: Pacemaker, open_port: OpenPort) -> None:
         self._lines, self._data, self._pacemaker, self._open_port = lines, data, pacemaker, open_port
+        self._lines_begun = b""
         self._until: int | None = None  # the bench closes the link: frames go out until then
 
     def run(self, bench: int) -> None:
@@ -156,7 +157,14 @@ class Session:
             records = self._data.recv(65536)
         except OSError:
             return False
-        self._pacemaker.backlog += [(i, data[:length], flags) for i, flags, length, data in RECORD.iter_unpack(records)]
+        for identifier, flags, length, data in RECORD.iter_unpack(records):
+            part = data[:length]
+            if flags & RAW:  # a heartbeat must not come between the parts of a line
+                self._lines_begun += part
+                if not part.endswith((b"\r", b"\n")):
+                    continue
+                part, self._lines_begun = self._lines_begun, b""
+            self._pacemaker.backlog.append((identifier, part, flags))
         return bool(records)
 
     def _orders(self) -> None:

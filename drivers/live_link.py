@@ -106,8 +106,11 @@ class LiveLink:
             raise self._error
         if self._down:
             raise LinkError(f"link {self._name} is lost and being opened again; nothing can be sent")
-        if self._heartbeat.owns_port:
-            self._heartbeat.send(batch)
+        if isinstance(self._heartbeat, HeartbeatProcess) and self._heartbeat.owns_port:
+            if (lines := self._wire.spoken(batch)) is None:
+                self._heartbeat.send(batch)
+            elif lines:
+                self._heartbeat.send_bytes(lines)
         else:
             self._write_now(batch)
 

@@ -11,10 +11,11 @@ from bench.errors import ConfigError, LinkError
 from bench.link import LinkStats
 from bench.link.frames import FrameBatch
 from bench.link.packetstream import PacketStream, encode
-from bench.rigfile import LinkSpec, linkurl
+from bench.rigfile import LinkSpec, RigFile, linkurl
 from drivers.beat import WriterSpec
 from drivers.byteport import BytePort
 from drivers.canbus import CanBus, open_bus
+from drivers.commandlinewire import open_command_line
 
 IN_PROCESS = ("virtual", "serial", "slcan", "seeedstudio", "robotell")
 """CAN interfaces of python-can that another process cannot reach, or that two readers would take bytes from."""
@@ -47,6 +48,10 @@ class Wire(Protocol):
         Raises:
             LinkError: lost, or it takes nothing.
         """
+        ...
+
+    def spoken(self, batch: FrameBatch) -> bytes | None:
+        """Whole lines of frames for another process that writes; None where that makes its bytes of frames itself."""
         ...
 
     def writer(self) -> WriterSpec:
@@ -102,6 +107,10 @@ class PacketWire:
             self._port.write(data)
             self.stats.sent += len(batch)
 
+    def spoken(self, batch: FrameBatch) -> bytes | None:
+        """As Wire says."""
+        return None
+
     def writer(self) -> WriterSpec:
         """As Wire says."""
         number = self._port.fileno()
@@ -146,6 +155,10 @@ class CanWire:
         with self._writing:
             self._can.write(batch)
 
+    def spoken(self, batch: FrameBatch) -> bytes | None:
+        """As Wire says."""
+        return None
+
     def writer(self) -> WriterSpec:
         """As Wire says."""
         if (slcan := self._can.slcan) is not None:
@@ -171,8 +184,9 @@ class CanWire:
 
 
 def open_wire(
-    spec: LinkSpec, name: str, identifiers: Sequence[int] = (), now_ns: Callable[[], int] | None = None
-) -> Wire:
+    spec: LinkSpec, name: str, identifiers: Sequence[int] = (), now_ns: Callable[[], int] | None = None,
+    rig: RigFile | None = None,
+) -> Wire:  # fmt: skip
     """Open the transport of a link.
 
     Args:
@@ -180,6 +194,7 @@ def open_wire(
         name: of the link.
         identifiers: of the messages that the other end sends: what a CAN interface's filters let pass.
         now_ns: host clock of the rig, UNIX ns; it stamps frames.
+        rig: whose table `commandline` says how its messages are said on a command line.
 
     Raises:
         ConfigError: the URL is none of a controller's link, or the port or interface cannot be opened.
@@ -190,7 +205,9 @@ def open_wire(
         return CanWire(open_bus(spec, name, identifiers, clock))
     if url.scheme == "serial":
         return PacketWire(open_port(name, url, BytePort), clock)
-    raise ConfigError(f"link {name}: found {spec.url!r}; expected a URL that starts with slcan:, can: or serial:")
+    if url.scheme == "cli" and rig is not None:
+        return open_command_line(url, name, rig, clock)
+    raise ConfigError(f"link {name}: found {spec.url!r}; expected a URL that starts with slcan:, can:, serial: or cli:")
 
 
 P = TypeVar("P", bound=BytePort)

@@ -91,6 +91,7 @@ class Machine:
         columns: of a machine whose rows are channels of the rig file, their names there; `channels` and `places` say nothing
             then.
         motions: what it truly does under a plan.
+        controller: what speaks for it in this process, and what is served, of rig, truth, faults and substeps; None: messages.
     """
 
     name: str
@@ -115,6 +116,8 @@ class Machine:
     columns: Callable[[RigFile], tuple[str, ...]] | None = None
     controls: frozenset[str] = frozenset()
     motions: Motions = NONE
+    controller: Callable[..., Any] | None = None
+    served: Callable[..., Any] | None = None
 
 
 @dataclass(frozen=True)

@@ -166,7 +166,7 @@ def _live_link(rig: RigFile, session: Session, wall: Clock) -> LiveLink:
 
     spec, name = rig.link, rig.devices["controller"].link
     identifiers = [sign.IDENTIFIER, *(m.identifier for m in rig.messages.messages.values())]
-    return LiveLink(name, lambda: open_wire(spec, name, identifiers, wall.now_ns), beat_of(rig, session),
+    return LiveLink(name, lambda: open_wire(spec, name, identifiers, wall.now_ns, rig), beat_of(rig, session),
                     heartbeat=spec.heartbeat, reconnect_s=spec.reconnect_s)  # fmt: skip
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import selectors
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +21,7 @@ from bench.rigfile import RigFile, linkurl, load_rig
 
 if TYPE_CHECKING:
     from sim_backend.machine import SimulatedPlant, Truth
+    from sim_backend.serving.peers import Peer
     from sim_backend.serving.ports import Port
     from sim_backend.serving.service import Service
     from sim_backend.serving.wirefaults import WireFaults
@@ -62,7 +63,7 @@ def serve_command(request: ServeRequest) -> int:
         [fault_injection.parse(text) for text in request.faults], simulated=True
     )
     truth = draw(rig, request.seed, _overrides(request.truth), visit=request.visit)
-    controller = SimulatedController(rig, truth, in_device)
+    controller = (truth.machine.served or SimulatedController)(rig, truth, in_device)
     wire = WireFaults(on_link, truth.noise, [rig.messages[name].identifier for name in rig.binding.telemetry])
     stopped: list[str] = []
     with ExitStack() as stack:
@@ -106,7 +107,7 @@ def open_ports(
     """
     from sim_backend.serving import ptys
     from sim_backend.serving.adapter import SlcanAdapter
-    from sim_backend.serving.peers import LinePeer, PacketPeer
+    from sim_backend.serving.peers import BytesPeer, LinePeer, PacketPeer
     from sim_backend.serving.ports import PtyPort, TcpPort
 
     name = rig.devices["controller"].link
@@ -115,7 +116,13 @@ def open_ports(
     def adapter() -> SlcanAdapter:
         return SlcanAdapter(spec.bitrate, spec.data_bitrate, wire.bus_off)
 
-    for scheme, peer in (("slcan", adapter), ("serial", lambda: PacketPeer(wire.corrupt))):
+    kinds: tuple[tuple[str, Callable[[], Peer]], ...] = (
+        ("slcan", adapter),
+        ("serial", lambda: PacketPeer(wire.corrupt)),
+    )
+    if truth.machine.served is not None:
+        kinds = (("cli", BytesPeer),)
+    for scheme, peer in kinds:
         if ptys.AVAILABLE:
             ports.append(PtyPort(f"{name} {scheme}:{{}}", peer, selector))
         address = (bind, _port(spec.url, scheme))
@@ -138,7 +145,10 @@ def _port(url: str, scheme: str) -> int:
 def _check_links(rig: RigFile, assignments: Sequence[str]) -> None:
     """An address given on purpose must be one that can be listened on; the rig file may name a real adapter."""
     expected: dict[str, tuple[str, ...]] = {}
-    expected[rig.devices["controller"].link] = ("slcan:socket://HOST:PORT", "serial:socket://HOST:PORT")
+    forms: tuple[str, ...] = ("slcan:socket://HOST:PORT", "serial:socket://HOST:PORT")
+    if rig.commandline is not None:
+        forms = ("cli:socket://HOST:PORT",)
+    expected[rig.devices["controller"].link] = forms
     if hands := rig.link_of("operator"):
         expected[hands] = ("line:HOST:PORT",)
     for device in rig.devices.values():
@@ -147,8 +157,8 @@ def _check_links(rig: RigFile, assignments: Sequence[str]) -> None:
     for text in assignments:
         name, _, url = text.partition("=")
         if name in expected and not any(url.startswith(form.partition("HOST")[0]) for form in expected[name]):
-            forms = " or ".join(expected[name])
-            raise ConfigError(f"--link {text}: cannot listen there; expected {name}={forms}; port 0 takes any free one")
+            such = " or ".join(expected[name])
+            raise ConfigError(f"--link {text}: cannot listen there; expected {name}={such}; port 0 takes any free one")
 
 
 def _overrides(assignments: Sequence[str]) -> Mapping[str, float]:

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench import units
+from bench.clock import TickClock
 from bench.errors import LinkError
 from bench.link.frames import ERROR, FrameBatch
 from bench.link.hosttime import HostMap
@@ -66,8 +67,8 @@ class TelemetryDecoder:
     def __post_init__(self) -> None:
         self._assembler = Assembler(self.rig)
         self._first = self.rig.messages[self.rig.binding.telemetry[0]]
-        self._tick_ns = round(self.rig.devices["controller"].tick_s * 1e9)
-        self._ticks = self._first.period_s * 1e9 / self._tick_ns  # of a sample
+        self._clock = TickClock(self.rig.devices["controller"].tick_s)
+        self._ticks = self._clock.ticks(self._first.period_s)  # of a sample
         self._known = {sign.IDENTIFIER, *(m.identifier for m in self.rig.messages.messages.values())}
         self._segment: _Segment | None = None
         self._index = 0
@@ -91,7 +92,7 @@ class TelemetryDecoder:
     def newest_ns(self) -> int:
         """Time of the newest sample on the sample clock; 0 before the first."""
         s = self._segment
-        return s.offset_ns + s.tick * self._tick_ns if s is not None else 0
+        return s.offset_ns + self._clock.ns(s.tick) if s is not None else 0
 
     def placed(self, tick: int) -> tuple[int, int]:
         """A tick of 32 bits that the controller named: as the telemetry counts it, and its time on the sample clock.
@@ -103,7 +104,7 @@ class TelemetryDecoder:
         if s is None:
             raise LinkError("no telemetry has come: a tick of the controller has no time yet")
         whole = s.tick + int(signed(np.array(tick - s.tick), 32))
-        return whole, s.offset_ns + whole * self._tick_ns
+        return whole, s.offset_ns + self._clock.ns(whole)
 
     @property
     def period_ns(self) -> int:
@@ -143,7 +144,7 @@ class TelemetryDecoder:
         s = self._segment
         if s is None:
             raw, tick = int(rows.sequence[0]), int(rows.tick[0])
-            offset = int(rows.arrived[0]) - tick * self._tick_ns
+            offset = int(rows.arrived[0]) - self._clock.ns(tick)
             s = self._segment = _Segment(offset, raw, tick, raw)
             last = raw - 1
         else:
@@ -163,7 +164,7 @@ class TelemetryDecoder:
         self._stale = 0
         columns = {name: x[keep] for name, x in rows.columns.items()}
         self.latest = {name: float(x[-1]) for name, x in columns.items()}
-        self.host.take(s.offset_ns + ticks[keep] * self._tick_ns, rows.arrived[keep])
+        self.host.take(s.offset_ns + self._clock.all_ns(ticks[keep]), rows.arrived[keep])
         self._count_leaps(np.diff(rows.sequence[keep], prepend=s.raw), np.diff(ticks[keep], prepend=s.tick))
         s.raw, s.sequence, s.tick = int(rows.sequence[keep[-1]]), int(sequence[keep[-1]]), int(ticks[keep[-1]])
         return self._split(sequence[keep], last, ticks[keep], columns, int(rows.arrived.max()))
@@ -194,7 +195,7 @@ class TelemetryDecoder:
         s, n = self._segment, len(rows)
         assert s is not None
         ticks = s.tick + round(self._ticks) * np.arange(1, n + 1)
-        t_ns = s.offset_ns + ticks * self._tick_ns
+        t_ns = s.offset_ns + self._clock.all_ns(ticks)
         self._stale = 0
         self.latest = rows.last()
         self.host.take(t_ns, rows.arrived)
@@ -228,7 +229,7 @@ class TelemetryDecoder:
         if s is None:
             return 0
         _, went = self._unwrapping.shortest(np.diff(rows.sequence, prepend=s.raw), np.diff(rows.tick, prepend=s.tick))
-        back = np.flatnonzero(went * self._tick_ns < -REBOOT_S * 1e9)
+        back = np.flatnonzero(went * self._clock.tick_ns < -REBOOT_S * 1e9)
         if not len(back):
             return 0
         if back[0] == 0:
@@ -261,7 +262,7 @@ class TelemetryDecoder:
                     STREAM,
                     self._index,
                     ticks[part].astype(np.uint64),
-                    self._segment.offset_ns + ticks[part] * self._tick_ns,
+                    self._segment.offset_ns + self._clock.all_ns(ticks[part]),
                     host_ns,
                     lost,
                     {n: x[part] for n, x in columns.items()},

@@ -14,6 +14,7 @@ from bench.rigfile.check_binding import find, fits, signal_at
 from bench.rigfile.check_binding import problems_of as problems_of_binding
 from bench.rigfile.check_capabilities import problems_of as problems_of_capabilities
 from bench.rigfile.check_capture import problems_of as problems_of_capture
+from bench.rigfile.check_commandline import problems_of as problems_of_commandline
 from bench.rigfile.check_machine import problems_of as problems_of_machine
 from bench.rigfile.check_numbers import MACHINE
 from bench.rigfile.check_numbers import problems_of as problems_of_numbers
@@ -197,8 +198,15 @@ def _bindings(rig: RigFile, messages: MessageMap) -> Iterator[Problem]:
         elif channel.unit in units.UNITS and units.UNITS[dbc_unit].si != units.UNITS[channel.unit].si:
             yield Problem(rig.path, f"channels.{name}.unit", channel.unit, f"the kind of {dbc_unit} ({channel.signal})")
     yield from _signals_of_parameters(rig, messages)
-    captures = problems_of_capture(rig.capture, messages) if rig.capture is not None else ()
-    for key, found, expected in (*problems_of_binding(rig, messages), *problems_of_states(rig, messages), *captures):
+    captures = (
+        problems_of_capture(rig.capture, messages, on_a_line=rig.commandline is not None)
+        if rig.capture is not None
+        else ()
+    )
+    spoken = problems_of_commandline(rig, messages)
+    for key, found, expected in (
+        *problems_of_binding(rig, messages), *problems_of_states(rig, messages), *captures, *spoken
+    ):  # fmt: skip
         yield Problem(rig.path, key, found, expected)
 
 

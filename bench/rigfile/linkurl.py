@@ -4,6 +4,7 @@
     slcan:PORT                              CAN over the Lawicel ASCII protocol; PORT is a serial port or URL
     can:INTERFACE:CHANNEL?key=value         any other interface of python-can
     serial:PORT?baudrate=N                  the same messages in COBS packets
+    cli:PORT?baudrate=N                     the controller's command line, as the rig file's [commandline] says
     modbus-tcp:HOST:PORT                    Modbus TCP
     modbus-rtu:PORT?baudrate=N&parity=E     Modbus RTU on a serial port
     modbus-rtu-tcp:HOST:PORT                RTU frames over TCP
@@ -26,12 +27,13 @@ EXAMPLES = {
     "slcan": "slcan:/dev/ttyACM0",
     "can": "can:socketcan:can0",
     "serial": "serial:/dev/ttyUSB0?baudrate=3000000",
+    "cli": "cli:serial:/dev/ttyUSB0?baudrate=921600",
     "modbus-tcp": "modbus-tcp:192.168.0.20:502",
     "modbus-rtu": "modbus-rtu:/dev/ttyUSB1?baudrate=19200",
     "modbus-rtu-tcp": "modbus-rtu-tcp:192.168.0.20:502",
     "line": "line:127.0.0.1:28504",
 }
-CONTROLLER_SCHEMES = ("inprocess", "slcan", "can", "serial")
+CONTROLLER_SCHEMES = ("inprocess", "slcan", "can", "serial", "cli")
 TCP_SCHEMES = ("modbus-tcp", "modbus-rtu-tcp", "line")
 MODBUS_SCHEMES = ("modbus-tcp", "modbus-rtu", "modbus-rtu-tcp")
 

@@ -19,6 +19,7 @@ from bench.errors import ConfigError, Problem
 from bench.rigfile.binding import Binding
 from bench.rigfile.capabilities import Capabilities
 from bench.rigfile.capture import CaptureSpec
+from bench.rigfile.commandline import CommandLine
 from bench.rigfile.elements import FORMS, MachineTables, Name
 from bench.rigfile.former_names import with_aliases
 from bench.rigfile.former_parameters import with_capabilities
@@ -62,7 +63,12 @@ class LinkSpec(Part):
         scheme, _, rest = self.url.partition(":")
         fd = self.options.get("fd", dict(parse_qsl(rest.partition("?")[2])).get("fd", "false"))
         asked = str(fd).lower() not in ("false", "0")
-        return scheme.lower() != "serial" and self.bitrate is not None and self.data_bitrate is None and not asked
+        return (
+            scheme.lower() not in ("serial", "cli")
+            and self.bitrate is not None
+            and self.data_bitrate is None
+            and not asked
+        )
 
 
 Role = Literal["levitation", "rotation", "motion", "operator", "drive", "supply", "thermal"]
@@ -165,6 +171,7 @@ class RigFile(MachineTables):
     machine: Mapping[str, Toleranced] = {}
     calibration: CalibrationTable = CalibrationTable()
     capture: CaptureSpec | None = None
+    commandline: CommandLine | None = None
     envelope: Envelope
     capabilities: Capabilities = Capabilities()
     aliases: Mapping[Name, Annotated[str, Field(pattern=r"^[^@]+@[^@]+$")]] = {}

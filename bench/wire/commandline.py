@@ -94,6 +94,11 @@ def request(tag: int, *words: str) -> bytes:
     return f"{with_checksum(' '.join((str(tag), *words)))}\n".encode("ascii")
 
 
+def beat(line: str) -> bytes:
+    """The bytes of a line that is said without a tag and whose reply nobody waits for: a heartbeat."""
+    return f"{with_checksum(line)}\n".encode("ascii")
+
+
 def read_line(text: str, prompt: str = "") -> Reply | Event | None:
     """What a line of a controller says, without a prompt before it.
 

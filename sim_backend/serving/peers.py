@@ -10,6 +10,7 @@ import numpy as np
 
 from bench.link import packetstream, slcanstream
 from bench.link.frames import ERROR, FrameBatch, empty_batch
+from sim_backend.octets import framed, unframed
 
 LONGEST_REQUEST = 4096
 
@@ -75,6 +76,21 @@ class PacketPeer:
     def hear(self, sent: Sent) -> None:
         data, self._sequence = packetstream.encode(sent.batch, self._sequence, sent.tick)
         self.answers += self._corrupt(data) if self._corrupt is not None else data
+
+
+class BytesPeer:
+    """The controller's serial line as it is: bytes, carried by frames with the identifier BYTES."""
+
+    on_bus = False
+
+    def __init__(self) -> None:
+        self.answers = bytearray()
+
+    def take(self, data: bytes, t_ns: int) -> FrameBatch:
+        return framed(data, t_ns)
+
+    def hear(self, sent: Sent) -> None:
+        self.answers += unframed(sent.batch)
 
 
 class LinePeer:

@@ -100,7 +100,7 @@ def fly(params: PlantParams, seed: int = 0, *, reduced: bool = False, profiles: 
             if plant.state != "LEVITATED":
                 return flown(plant.fault)
     plant.command("land")
-    landed = host.until("IDLE", 2.0)
+    landed = host.until("CURRENT", 2.0)
     return flown("landed" if landed else plant.fault)
 
 

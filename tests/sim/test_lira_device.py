@@ -108,7 +108,7 @@ def test_lists_name_every_parameter_and_channel() -> None:
     assert [line.split()[1] for line in host.more] == [s.name for s in SETTINGS]
     host.ask("list", "chan")
     assert [line.split()[1] for line in host.more] == [m.name for m in MEASUREMENTS]
-    assert len(host.more) == 52
+    assert len(host.more) == 62
 
 
 def test_every_parameter_is_got_as_it_was_set() -> None:
@@ -135,7 +135,7 @@ def test_a_mission_over_the_line_tells_its_states() -> None:
     host.ask("land")
     host.wait(2.0)
     told = [e.text for e in host.events if e.name == "state"]
-    assert told == ["IDLE", "CURRENT", "LIFT", "LEVITATED", "LANDING", "IDLE"]
+    assert told == ["IDLE", "CURRENT", "LIFT", "LEVITATED", "LANDING", "CURRENT"]
     assert [e.tick for e in host.events] == sorted(e.tick for e in host.events)
 
 

@@ -49,7 +49,7 @@ def states(rows: Array) -> list[str]:
 
 def test_the_states_of_a_mission_in_their_order() -> None:
     flown = fly(PlantParams(), 1, reduced=True)
-    assert states(flown.rows) == ["OFF", "CURRENT", "LIFT", "LEVITATED", "LANDING", "IDLE"]
+    assert states(flown.rows) == ["OFF", "CURRENT", "LIFT", "LEVITATED", "LANDING", "CURRENT"]
     landing = flown.rows[flown.rows[:, MODE] == STATES.index("LANDING")]
     asked = TRACE.index("wanted_q_B1")
     let_go = int(np.argmax(abs(landing[:, asked]) == 0))

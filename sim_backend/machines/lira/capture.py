@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -65,6 +67,23 @@ class Capture:
         """As `cap stat` says it."""
         return "done" if self.full else "armed" if self._fired is None else "running"
 
+    @property
+    def before_trigger(self) -> int:
+        """Samples that it has of the time before the trigger."""
+        return self.before if self._fired is None else min(self.before, self._fired)
+
+    @property
+    def data(self) -> bytes:
+        """All of it, once it is full."""
+        assert self._fired is not None
+        first = self._fired - self.before_trigger
+        return np.concatenate(self._kept)[first : first + self.length].tobytes()
+
+    @cached_property
+    def crc(self) -> int:
+        """CRC-32 of its bytes."""
+        return zlib.crc32(self.data)
+
     def take(self, rows: Array, tick: int) -> None:
         """Rows (n, len(WHOLE)) of the machine, every `every` ticks from a tick on."""
         if self.full or not len(rows):
@@ -93,9 +112,7 @@ class Capture:
 
     def blocks(self, offset: int, length: int) -> Iterator[bytes]:
         """Blocks of a part of its bytes; nothing beyond its end."""
-        assert self._fired is not None
-        first = self._fired - min(self.before, self._fired)
-        data = np.concatenate(self._kept)[first : first + self.length].tobytes()
+        data = self.data
         end = min(offset + length, len(data))
         for at in range(offset, end, LARGEST):
             yield block(self.number, at, data[at : min(at + LARGEST, end)])

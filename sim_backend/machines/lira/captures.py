@@ -52,7 +52,7 @@ class Captures:
         rate, length, before = (int(number(w)) for w in words[1:4])
         channels = tuple(k for k in range(len(MEASUREMENTS)) if mask >> k & 1)
         if rate not in EVERY or not channels or mask >> len(MEASUREMENTS) or length < 1 or not 0 <= before < length:
-            raise Refused(3, "mask of 52 channels, 35000|140000|280000, before < length")
+            raise Refused(3, f"mask of {len(MEASUREMENTS)} channels, 35000|140000|280000, before < length")
         if (rate > 35_000 and len(channels) > FAST) or 2 * len(channels) * length > MEMORY:
             raise Refused(3, f"{FAST} channels above 35000 Hz, {MEMORY} bytes")
         self._count += 1
@@ -68,7 +68,9 @@ class Captures:
 
     def _cap_stat(self) -> Iterable[str]:
         c = self._captured()
-        return [f"{c.number} {c.state} bytes={c.size} tick={c.first_tick} every={c.every} channels={len(c.channels)}"]
+        told = f"bytes={c.size} samples={c.samples} trigger={c.before_trigger} tick={c.first_tick} every={c.every}"
+        crc = f" crc={c.crc}" if c.full else ""
+        return [f"{c.number} {c.state} {told} channels={len(c.channels)}{crc}"]
 
     def _read(self, *words: str) -> Iterable[str | bytes]:
         c = self._captured()

@@ -12,10 +12,13 @@ from sim_backend.machines.lira.captures import Captures
 from sim_backend.machines.lira.plant import DQ, FAULTS, POSITION_TICKS, STATES, TICKS_S, WHOLE, Plant
 from sim_backend.machines.lira.settings import AXES_OF_LINE, BY_NAME, MEASUREMENTS, SETTINGS
 from sim_backend.machines.lira.shell import Refused, Shell, number, single
+from sim_backend.machines.lira.streamed import Streamed
 
 RATES: Final = (115_200, 921_600, 3_000_000)
 RESTING: Final = ("OFF", "IDLE")
-AT_ONCE: Final = ("lift", "land", "stop", "clear")
+AT_ONCE: Final = ("lift", "land", "stop", "clear", "safe")
+SWITCHES: Final = ("echo", "prompt", "checksum", "event")
+SWITCHED: Final = {"checksum": "checksums", "event": "events"}
 COLUMNS: Final = {m.name: (m, WHOLE.index(m.column)) for m in MEASUREMENTS}
 
 
@@ -35,12 +38,14 @@ class Device:
         self._rows: Array = plant.run(1 / 35000, whole=True)
         self._told = (plant.state, plant.fault)
         self._captures = Captures()
+        self.streamed = Streamed()
+        """Slow telemetry: blocks that wait to be sent."""
         self._verbs: dict[str, Callable[..., Iterable[str | bytes]]] = {
             "id": self._id, "stat": self._stat, "meas": self._meas, "list": self._list, "get": self._get, "set": self._set,
-            "default": self._default, "on": self._on, "ref": self._ref, "step": self._step, "inj": self._inj, "hb": self._hb,
-            "baud": self._baud, "cap": self._captures.do, "echo": self._switch("echo"), "prompt": self._switch("prompt"),
-            "checksum": self._switch("checksums"), "event": self._switch("events"),
+            "default": self._default, "on": self._on, "ref": self._ref, "halt": self._halt, "step": self._step,
+            "inj": self._inj, "hb": self._hb, "stream": self.streamed.do, "baud": self._baud, "cap": self._captures.do,
         }  # fmt: skip
+        self._verbs |= {name: self._switch(name) for name in SWITCHES}
         self._verbs |= {name: self._command(name) for name in AT_ONCE}
         self._factory = {s.name: float(plant.get(s.field)) for s in SETTINGS}
 
@@ -56,7 +61,9 @@ class Device:
             ticks = min(left, TICKS_S // 1000)
             capture = self._captures.running
             at = self.plant.tick
-            self._rows = self.plant.run(ticks / TICKS_S, capture.every if capture else POSITION_TICKS, whole=True)
+            every = capture.every if capture else POSITION_TICKS
+            self._rows = self.plant.run(ticks / TICKS_S, every, whole=True)
+            self.streamed.take(self._rows, at, every, self.plant.heard_s)
             if capture is not None:
                 capture.take(self._rows, at)
                 if capture.full:
@@ -88,7 +95,7 @@ class Device:
         def switch(*words: str) -> Iterable[str]:
             if len(words) != 1 or words[0] not in ("on", "off"):
                 raise Refused(2, "on|off")
-            setattr(self.shell, field, words[0] == "on")
+            setattr(self.shell, SWITCHED.get(field, field), words[0] == "on")
             return [words[0]]
 
         return switch
@@ -177,9 +184,9 @@ class Device:
             raise Refused(4, f"state={self.plant.state}")
         value, *rates = (number(w) for w in words[1:])
         low, high = {"z": (-1e-3, 20e-3), "gamma": (-math.inf, math.inf)}.get(words[0], (-50e-6, 50e-6))
-        if not low <= value <= high or any(r <= 0 for r in rates):
+        if not low <= value <= high or any(r < 0 for r in rates):
             raise Refused(3, f"{words[0]} {low:.9g}..{high:.9g}")
-        self.plant.go(AXES_OF_LINE[words[0]], value, *rates)
+        self.plant.go(AXES_OF_LINE[words[0]], value, *(rates if all(rates) else ()))
         return [f"{words[0]}={value:.9g}"]
 
     def _step(self, *words: str) -> Iterable[str]:
@@ -208,6 +215,15 @@ class Device:
                             ("inject_axis", float(tuple(AXES_OF_LINE).index(words[0])))):  # fmt: skip
             self.plant.set(name, value)
         return [f"{words[0]} {words[1]} {amplitude:.9g} {hz:.9g}"]
+
+    def _halt(self, *words: str) -> Iterable[str]:
+        """Angle and z stay where they come to rest when they are braked now."""
+        if words:
+            raise Refused(2, "none")
+        for axis, speed, rise in (("z", 0.5, 40.0), ("angle", 18.0, 300.0)):
+            at, rate = self.plant.set_point(axis)
+            self.plant.go(axis, at + rate * abs(rate) / (2 * rise), speed, rise)
+        return [self.plant.state]
 
     def _hb(self, *words: str) -> Iterable[str]:
         if len(words) != 1 or not words[0].isdigit():

@@ -59,7 +59,7 @@ typedef struct {
     int32_t member[5][3];                    /* half-bridges of each star */
     int32_t currents_on, bearings_on, angle_on, axial_on, fresh, limited;
     double target[6], speed[6], rise[6]; /* where set points go, m or rad, and how fast at most */
-    int32_t mode, fault, gate_clock, lost_clock;
+    int32_t mode, fault, gate_clock, lost_clock, off_after; /* off_after: a landing ends without currents */
     int64_t heard; /* tick of the last heartbeat; -1: none is waited for */
     core_noise noise;
     int64_t tick;
@@ -82,7 +82,7 @@ void lira_coils(const double *dq, double cos_phase, double sin_phase, double *co
 #define LIRA_WHOLE (LIRA_TRACE + 3 * BRIDGES + 1)
 #define STEP_S (LIRA_TICK * POSITION_TICKS)
 enum { LIRA_OFF, LIRA_IDLE, LIRA_CURRENT, LIRA_LIFT, LIRA_LEVITATED, LIRA_LANDING, LIRA_FAULT };
-enum { DO_IDLE, DO_ON, DO_LIFT, DO_LAND, DO_STOP, DO_CLEAR };
+enum { DO_IDLE, DO_ON, DO_LIFT, DO_LAND, DO_STOP, DO_CLEAR, DO_SAFE };
 enum { FAULT_NONE, FAULT_LOST, FAULT_CURRENT, FAULT_SUPPLY };
 enum { X1, X2, Y1, Y2, Z, ANGLE };
 

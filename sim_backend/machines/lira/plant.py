@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -16,7 +17,7 @@ POSITION_TICKS: Final = 8
 AXES: Final = ("x1", "x2", "y1", "y2", "z", "angle")
 SYSTEMS: Final = ("R1", "B1", "R2", "B2", "L")
 STATES: Final = ("OFF", "IDLE", "CURRENT", "LIFT", "LEVITATED", "LANDING", "FAULT")
-COMMANDS: Final = ("idle", "on", "lift", "land", "stop", "clear")
+COMMANDS: Final = ("idle", "on", "lift", "land", "stop", "clear", "safe")
 FAULTS: Final = ("NONE", "LEVITATION_LOST", "OVERCURRENT", "SUPPLY")
 DQ: Final = tuple(f"{way}_{name}" for name in SYSTEMS for way in "dq")
 PHASES: Final = range(1, 16)
@@ -95,6 +96,11 @@ class Plant:
     def beat(self) -> None:
         """A heartbeat of the host."""
         self._s.heard = self._s.tick
+
+    @property
+    def heard_s(self) -> float:
+        """Since the host's last heartbeat; infinite while none is waited for."""
+        return (self._s.tick - self._s.heard) / TICKS_S if self._s.heard >= 0 else math.inf
 
     @property
     def state(self) -> str:

@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from sim_backend.machines.lira.plant import MEASURED
+from sim_backend.machines.lira.plant import DQ, MEASURED
 
 
 @dataclass(frozen=True)
@@ -89,5 +89,7 @@ def _measurement(column: str) -> Measurement:
     return Measurement(name, column, "m", 1e-6 if column == "z" else 0.25e-6)
 
 
-MEASUREMENTS: Final = tuple(_measurement(c) for c in MEASURED)
-"""The 52, in the order of a capture's mask, the first one in its lowest bit."""
+INNER: Final = tuple(Measurement(f"i_{name}", f"i_{name}", "A", 1e-3) for name in DQ)
+"""The firmware's own dq currents."""
+MEASUREMENTS: Final = (*(_measurement(c) for c in MEASURED), *INNER)
+"""The 52 and the firmware's own, in the order of a capture's mask, the first one in its lowest bit."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import struct
+from collections import deque
 from collections.abc import Iterable, Iterator
 from typing import Final, Protocol
 
@@ -74,6 +75,8 @@ class Shell:
         self._too_long = False
         self._last: tuple[str, bytes] = ("", b"")
         self._waiting: list[str] = []
+        self.later: deque[list[bytes]] | None = None
+        """Where replies with blocks go, piece by piece, for a line that they take time on; None: they are answered at once."""
 
     def feed(self, data: bytes) -> bytes:
         """What is answered to these characters."""
@@ -132,7 +135,11 @@ class Shell:
         out = [part if isinstance(part, bytes) else self._ended(f"{tag} + {part}", checked) for part in said[:-1]]
         last = said[-1]
         assert isinstance(last, str)
-        return b"".join((*out, self._ended(f"{tag} ok {last}".rstrip(), checked)))
+        out.append(self._ended(f"{tag} ok {last}".rstrip(), checked))
+        if self.later is None or not any(isinstance(part, bytes) for part in said):
+            return b"".join(out)
+        self.later.append(out)
+        return b""
 
     @staticmethod
     def _ended(line: str, checked: bool) -> bytes:

@@ -1,6 +1,6 @@
 /* States of the firmware, at every reading of the positions: OFF, IDLE (no PWM), CURRENT (current loops, angle and z; in the
  * touchdown rings), LIFT (bearings on, out of the rings, gate running), LEVITATED, LANDING (down, bearings off in the rings, on to
- * z = 0), FAULT. L's VI-B: the gate wants all four radial readings within +-20 um for 250 ms; landing at 10 mm/s, off at 2.7 mm. */
+ * z = 0; there into CURRENT, or where nobody listens or it was made safe into IDLE), FAULT. L's VI-B: the gate wants all four radial readings within +-20 um for 250 ms; landing at 10 mm/s, off at 2.7 mm. */
 #include <math.h>
 #include <string.h>
 #include "winding.h"
@@ -51,10 +51,18 @@ static void lift(const lira_control *c, lira_state *st) {
     aim(st, Z, c->z_lift, c->v_lift, 1);
 }
 
-static void land(const lira_control *c, lira_state *st) {
+static void land(const lira_control *c, lira_state *st, int off_after) {
+    st->off_after = off_after;
     st->gate_clock = 0;
     st->mode = LIRA_LANDING;
     aim(st, Z, 0, c->v_land, 1);
+}
+
+/* from wherever it is to where nothing flows; what is held is set down first */
+static void make_safe(const lira_control *c, lira_state *st) {
+    if (st->mode == LIRA_LIFT || st->mode == LIRA_LEVITATED) land(c, st, 1);
+    else if (st->mode == LIRA_LANDING) st->off_after = 1;
+    else if (st->mode == LIRA_CURRENT) off(st, LIRA_IDLE);
 }
 
 /* 0: done; 1: not in this state; 2: it stands too far from the middle to be lifted */
@@ -67,13 +75,14 @@ int32_t lira_command(const lira_params *p, const lira_control *c, lira_state *st
     case DO_LIFT:
         if (st->mode != LIRA_CURRENT) return 1;
         return farthest(st) > c->refuse_m ? 2 : (lift(c, st), 0);
-    case DO_LAND: return st->mode == LIRA_LIFT || st->mode == LIRA_LEVITATED ? (land(c, st), 0) : 1;
+    case DO_LAND: return st->mode == LIRA_LIFT || st->mode == LIRA_LEVITATED ? (land(c, st, 0), 0) : 1;
     case DO_STOP: return st->mode == LIRA_FAULT ? 1 : (off(st, LIRA_IDLE), 0);
     case DO_CLEAR:
         if (st->mode != LIRA_FAULT) return 1;
         off(st, LIRA_IDLE);
         st->fault = FAULT_NONE;
         return 0;
+    case DO_SAFE: make_safe(c, st); return 0;
     default: return 1;
     }
 }
@@ -104,7 +113,9 @@ static void gate(const lira_control *c, lira_state *st) {
 static void set_down(const lira_control *c, lira_state *st) {
     if (st->bearings_on && st->read[Z] <= c->z_off) st->bearings_on = 0;
     st->gate_clock = !st->bearings_on && st->ref[Z] == st->target[Z] ? st->gate_clock + 1 : 0;
-    if (st->gate_clock * STEP_S >= c->rest_s) off(st, LIRA_IDLE);
+    if (st->gate_clock * STEP_S < c->rest_s) return;
+    st->mode = LIRA_CURRENT;
+    if (st->off_after) off(st, LIRA_IDLE);
 }
 
 static void watch(const lira_params *p, const lira_control *c, lira_state *st) {
@@ -115,7 +126,8 @@ static void watch(const lira_params *p, const lira_control *c, lira_state *st) {
     for (int k = 0; k < BRIDGES; k++)
         if (fabs(st->coil[k]) > c->trip_A) trip(st, FAULT_CURRENT);
     int silent = st->heard >= 0 && (st->tick - st->heard) * LIRA_TICK > c->watchdog_s;
-    if (silent && (st->mode == LIRA_LIFT || st->mode == LIRA_LEVITATED)) land(c, st);
+    if (silent && (st->mode == LIRA_LIFT || st->mode == LIRA_LEVITATED)) land(c, st, 1);
+    if (silent && st->mode == LIRA_LANDING) st->off_after = 1;
     if (silent && st->mode == LIRA_CURRENT) off(st, LIRA_IDLE);
 }
 

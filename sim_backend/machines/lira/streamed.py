@@ -1,0 +1,72 @@
+"""Slow telemetry: twenty values so many times a second, in blocks of their own between the lines."""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Iterable, Iterator
+from typing import Final
+
+from bench.wire.commandline import block
+from sim_backend.core.plant import Array
+from sim_backend.machines.lira.plant import AXES, DQ, TICKS_S, WHOLE
+from sim_backend.machines.lira.shell import Refused
+
+NUMBER: Final = 0xFFFF
+SLOTS: Final = 35_000
+"""Readings of the positions a second: a rate is one of their divisors."""
+FASTEST: Final = 1000
+LSB: Final = (*(1e-8,) * 4, 1e-6, 2 * math.pi / 2**16, *(1e-3,) * len(DQ))
+SIGNED: Final = tuple(WHOLE.index(name) for name in (*AXES, *(f"i_{name}" for name in DQ)))
+SUPPLY, STATE, FAULT, LIMITED, SPEED = (
+    WHOLE.index(name) for name in ("u_dc", "mode", "fault", "limited", "rate_angle")
+)
+TOLD: Final = struct.Struct("<H16hHBBHhH")
+"""Sequence; x1 x2 y1 y2, z, angle, dq currents; supply, state, fault, limited loops, rate of the angle, ms since the last
+heartbeat."""
+
+
+class Streamed:
+    """What `stream HZ` asks for; `stream 0` ends it."""
+
+    def __init__(self) -> None:
+        self.waiting: list[bytes] = []
+        self._ticks = self._count = 0
+
+    def do(self, *words: str) -> Iterable[str]:
+        """Carry out a request.
+
+        Raises:
+            Refused: no rate, or one that is none of the readings' divisors.
+        """
+        if len(words) != 1 or not words[0].isdigit():
+            raise Refused(2, "Hz, or 0")
+        hz = int(words[0])
+        if hz and (hz > FASTEST or SLOTS % hz):
+            raise Refused(3, f"stream: a divisor of {SLOTS}, {FASTEST} at most")
+        self._ticks = TICKS_S // hz if hz else 0
+        return [words[0]]
+
+    def take(self, rows: Array, tick: int, every: int, heard_s: float) -> None:
+        """Rows (n, len(WHOLE)) of the machine, of every so many ticks from a tick on."""
+        for k in self._due(tick, every, len(rows)):
+            self._count = (self._count + 1) & 0xFFFF
+            self.waiting.append(block(NUMBER, (tick + k * every) & 0xFFFFFFFF, told(self._count, rows[k], heard_s)))
+
+    def _due(self, tick: int, every: int, count: int) -> Iterator[int]:
+        if self._ticks:
+            first = -(-tick // self._ticks) * self._ticks
+            yield from range((first - tick) // every, count, self._ticks // every)
+
+
+def told(count: int, row: Array, heard_s: float) -> bytes:
+    """The bytes of one sample."""
+    signed = [_held(round(row[k] / lsb), -(2**15), 2**15 - 1) for k, lsb in zip(SIGNED, LSB, strict=True)]
+    signed[5] = (round(row[SIGNED[5]] / LSB[5]) + 2**15) % 2**16 - 2**15  # an angle comes round
+    supply, age = (_held(round(x), 0, 0xFFFF) for x in (row[SUPPLY] / 0.01, min(heard_s, 65.535) * 1e3))
+    speed = _held(round(row[SPEED] / 0.005), -(2**15), 2**15 - 1)
+    return TOLD.pack(count, *signed, supply, int(row[STATE]), int(row[FAULT]), int(row[LIMITED]), speed, age)
+
+
+def _held(value: int, low: int, high: int) -> int:
+    return min(max(value, low), high)
