@@ -164,6 +164,19 @@ class SpeedsAsked:
 
 
 @dataclass(frozen=True)
+class CurrentAsked:
+    """Steps of currents that the controller regulates, of the machine at rest: by place the current, as the machine calls it,
+    and the proportional gain of its loop, V/A; the `size` of a large step and of a `small` one, A; what of the response counts,
+    s."""
+
+    steps: Mapping[str, str]
+    gains: Mapping[str, float]
+    size: float
+    small: float
+    response_s: float
+
+
+@dataclass(frozen=True)
 class Motions:
     """The truths of motion of one machine; None: it has none of that kind. Each takes the rig and what was drawn for it (a
     `Truth`) first.
@@ -181,6 +194,7 @@ class Motions:
         circle: balancing of loads on a circle, by quantity and place.
         angle: what steps of the angle show, by quantity and case.
         drag: what stops the shaft that coasts, by the names of a spindown: B and B_high N m s/rad, T_c N m, J_z kg m^2.
+        currents: what stepped currents do, by quantity and place.
         speeds: at the torque limit, by sharing: `speed` rad/s, `bound` A of the torque current, `ripple` rad/s.
     """
 
@@ -197,6 +211,7 @@ class Motions:
     drag: Callable[[Any, DragAsked], Mapping[str, float]] | None = None
     band: Callable[[RigFile, Any, BandAsked], Mapping[tuple[str, float | None], float]] | None = None
     speeds: Callable[[RigFile, Any, SpeedsAsked], Mapping[str, Mapping[str, float]]] | None = None
+    currents: Callable[[RigFile, Any, CurrentAsked], Mapping[tuple[str, str], float]] | None = None
 
 
 NONE = Motions()

@@ -232,6 +232,21 @@ def _derivative(done: Simulated) -> Found:
         yield name, "" if hz is None else f"{hz:g} Hz", value
 
 
+def _currents(done: Simulated) -> Found:
+    from sim_backend.motion import CurrentAsked
+
+    plan: Any = done.recording.plan
+    rig, currents = done.recording.rig, done.drawn.machine.motions.currents
+    if currents is None:
+        return
+    stepped = {name: rig.capabilities.current_steps[name] for name in plan.steps_at}
+    steps = {name: step.parameter.removeprefix("step_") for name, step in stepped.items()}
+    gains = {name: rig.parameters[step.gain].default for name, step in stepped.items() if step.gain}
+    asked = CurrentAsked(steps, gains, plan.size_A, plan.small_A, plan.response_s)
+    for (name, where), value in currents(rig, done.drawn, asked).items():
+        yield name, where, value
+
+
 def _compare(done: Simulated) -> Found:
     from procedures.one_axis.conventions import conventions
     from sim_backend.motion import CompareAsked
@@ -384,4 +399,5 @@ TRUTHS: Mapping[str, Callable[[Any], Found]] = {
     "derivative": _derivative,
     "load-balancing": _circle,
     "estimator-compare": _compare,
+    "current-step": _currents,
 }

@@ -162,6 +162,11 @@ class CurrentStep(Part):
         supply = (self.supply,) if self.supply else ()
         return (self.along, self.across, *self.voltages, *self.currents, *supply)
 
+    @property
+    def stated(self) -> tuple[str, ...]:
+        """Numbers of `[machine]` that it names."""
+        return tuple(name for name in (self.inductance, self.filter_inductance) if name)
+
 
 class Capabilities(Part):
     """`bias` is by bearing; `settings` are by kind and name: the parameters that choose it; of kind "law" the first is what a

@@ -21,7 +21,9 @@ def of_signals(taken: Sequence[Taken], plan: Plan) -> Iterator[Finding]:
         mine = [t for t in taken if (t.kind, t.place) == (kind, place)]
         share = max(t.lost / max(t.expected, 1) for t in mine)
         if share > plan.max_lost:
-            text = f"{share:.2%} of the samples of a step are missing ({plan.max_lost:.2%} is allowed). Look at the link."
+            text = (
+                f"{share:.2%} of the samples of a step are missing ({plan.max_lost:.2%} is allowed). Look at the link."
+            )
             yield Finding("missing-samples", text, place, Effect.INDETERMINATE)
         if any(np.ptp(t.along) == 0 for t in mine):
             yield Finding("stuck-channel", "the current does not move at all during a step.", place, Effect.ERROR)
@@ -84,7 +86,9 @@ def of_result(places: Sequence[Place]) -> Iterator[Finding]:
             concerns = tuple(f"{name}@{p.name}" for name in ("rise_time", "fall_time", "rise_bandwidth"))
             yield Finding("limit-untouched", text, p.name, Effect.INDETERMINATE, concerns)
         if small.current_touched or small.voltage_touched:
-            text = f"the small step touches a limit: {_said(small)}. Its band is not that of a small signal: step by less."
+            text = (
+                f"the small step touches a limit: {_said(small)}. Its band is not that of a small signal: step by less."
+            )
             yield Finding("small-step-limited", text, p.name, Effect.INDETERMINATE, (f"bandwidth_small@{p.name}",))
 
 

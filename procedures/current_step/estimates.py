@@ -84,7 +84,9 @@ def _place(name: str, taken: Sequence[Taken], rig: RigFile, plan: Plan) -> Place
     step = place_of(rig, name)
     large, small = ([t for t in taken if t.kind == kind] for kind in (LARGE, SMALL))
     if len(large) < 4 or len(small) < 4:
-        raise AnalysisError(f"{name}: found {len(large)} large and {len(small)} small steps; expected 4 or more of each")
+        raise AnalysisError(
+            f"{name}: found {len(large)} large and {len(small)} small steps; expected 4 or more of each"
+        )
     tick_s = large[0].tick_s
     before, after = round(LEAD_S / tick_s), round(plan.response_s / tick_s)
     edges = {kind: tuple(_edges(t) for t in some) for kind, some in ((LARGE, large), (SMALL, small))}
@@ -103,7 +105,8 @@ def _place(name: str, taken: Sequence[Taken], rig: RigFile, plan: Plan) -> Place
     found["across"] = _peak("across", name, across, True)
     found["bandwidth_small"] = _band(name, pairs, tick_s)
     found |= _design(rig, step) | _supply(rig, step, large)
-    limits = {kind: _limits(some, rig, step, found) for kind, some in ((LARGE, large), (SMALL, small))}
+    whole = [t for t in small if len(t.currents) == len(step.currents)]
+    limits = {kind: _limits(some, rig, step, found) for kind, some in ((LARGE, large), (SMALL, whole))}
     return Place(name, step, tuple(large), edges, limits, found, ups, across, pairs.mean(axis=0), before)
 
 
@@ -124,7 +127,9 @@ def _count(rig: RigFile, channel: str) -> float:
 
 
 def _scatter(value: float, u: float, unit: str, identity: str, count: int) -> Estimate:
-    return Estimate.of(value, Influence(f"scatter/{identity}", "scatter of the repeats", u, unit, "A", "normal", count - 1))
+    return Estimate.of(
+        value, Influence(f"scatter/{identity}", "scatter of the repeats", u, unit, "A", "normal", count - 1)
+    )
 
 
 def _known(u: float, unit: str, identity: str, name: str, source: str) -> Estimate:
@@ -171,8 +176,12 @@ def _supply(rig: RigFile, step: CurrentStep, large: Sequence[Taken]) -> dict[str
         return {}
     lead = round(fit.LEVEL_S / large[0].tick_s)
     means = np.array([t.supply[:lead].mean() for t in large])
-    out = _scatter(float(means.mean()), means.std(ddof=1) / math.sqrt(len(means)), "V", f"supply/{step.supply}", len(means))
-    out = out + _known(_count(rig, step.supply) / math.sqrt(12), "V", f"count/{step.supply}", "the capture's count", "its scale")
+    out = _scatter(
+        float(means.mean()), means.std(ddof=1) / math.sqrt(len(means)), "V", f"supply/{step.supply}", len(means)
+    )
+    out = out + _known(
+        _count(rig, step.supply) / math.sqrt(12), "V", f"count/{step.supply}", "the capture's count", "its scale"
+    )
     return {"u_dc": out if step.supply not in rig.sensors else out / certified_gain(rig, step.supply)}
 
 

@@ -30,7 +30,7 @@ def _window(p: Place) -> slice:
 
 def _ms(p: Place) -> Array:
     at = _window(p)
-    return (np.arange(p.along.shape[1])[at] - p.lead) * p.tick_s * 1e3
+    return np.asarray((np.arange(p.along.shape[1])[at] - p.lead) * p.tick_s * 1e3, np.float64)
 
 
 def _step(p: Place, plan: Plan) -> Figure:
@@ -39,8 +39,12 @@ def _step(p: Place, plan: Plan) -> Figure:
     begun = np.flatnonzero(d < 0.01)
     start = float(t[begun[-1]]) if len(begun) else float(t[0])
     size = plan.size_A
-    reference = Series("reference", np.array([t[0], start, start, t[-1]]), size * np.array([0.0, 0.0, 1.0, 1.0]), "guide")
-    below = Figure(f"across-{p.name}", "", "", "time / ms", f"{p.step.across} / mA", (Series("across", t, 1e3 * size * q),))
+    reference = Series(
+        "reference", np.array([t[0], start, start, t[-1]]), size * np.array([0.0, 0.0, 1.0, 1.0]), "guide"
+    )
+    below = Figure(
+        f"across-{p.name}", "", "", "time / ms", f"{p.step.across} / mA", (Series("across", t, 1e3 * size * q),)
+    )
     return Figure(
         f"step-{p.name}", f"Large step at {p.name}",
         f"Mean of {len(p.along)} steps of {size:g} A, time from where the current is half way. 10 to 90 % takes "

@@ -16,7 +16,9 @@ class Plan(BenchPlan):
     repeats: int = Field(10, ge=4)  # of the large step, up and back
     small_repeats: int = Field(30, ge=4)  # of the small one
     lead_s: float = Field(3e-3, ge=2e-3)  # from the start of a capture to the step at least
-    hold_s: float = Field(15e-3, ge=5e-3)  # from the step to the step back at least, and from there to the capture's end
+    hold_s: float = Field(
+        15e-3, ge=5e-3
+    )  # from the step to the step back at least, and from there to the capture's end
     spare_s: float = Field(15e-3, ge=0)  # of a capture, for what two writes take on their way
     response_s: float = Field(2e-3, ge=0.5e-3)  # after a step: what the response is taken of
     push_s: float = Field(0.05, ge=0.02)  # how long the large step is held for a look at the mover

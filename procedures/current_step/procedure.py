@@ -59,13 +59,13 @@ class Result:
     places: tuple[Place, ...]
 
 
-def captures(rig: RigFile, plan: Plan) -> Iterator[tuple[str, str, float]]:
-    """Kind, place and size A of every capture, in their order."""
+def captures(rig: RigFile, plan: Plan) -> Iterator[tuple[str, str, float, int]]:
+    """Kind, place, size A and repeat of every capture, in their order."""
     for name in plan.steps_at:
         if place_of(rig, name).still:
-            yield PUSH, name, plan.size_A
-        yield from [(LARGE, name, plan.size_A)] * plan.repeats
-        yield from [(SMALL, name, plan.small_A)] * plan.small_repeats
+            yield PUSH, name, plan.size_A, 0
+        yield from ((LARGE, name, plan.size_A, k) for k in range(plan.repeats))
+        yield from ((SMALL, name, plan.small_A, k) for k in range(plan.small_repeats))
 
 
 def step_count(plan: Plan) -> int:
@@ -86,11 +86,11 @@ def seconds(plan: Plan, kind: str) -> float:
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Of each place a held step with the positions, then large steps and small ones, each up and back in one capture."""
     assert rig.capture is not None
-    for number, (kind, name, size) in enumerate(captures(rig.file, plan)):
+    for number, (kind, name, size, repeat) in enumerate(captures(rig.file, plan)):
         place, lasts = place_of(rig.file, name), seconds(plan, kind)
         rate = rig.capture.rate_hz / (SLOWER if kind == PUSH else 1)
-        with record.step(kind, number=number, kind=kind, place=name, size_A=size):
-            rig.capture.arm(channels(place, kind), seconds=lasts, rate_hz=rate)
+        with record.step(kind, number=number, place=name, size_A=size, repeat=repeat):
+            rig.capture.arm(channels(place, kind, repeat), seconds=lasts, rate_hz=rate)
             rig.clock.sleep(plan.lead_s)
             rig.levitation.set(place.parameter, size)
             rig.clock.sleep(plan.push_s if kind == PUSH else plan.hold_s)

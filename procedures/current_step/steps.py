@@ -16,6 +16,7 @@ from procedures.current_step.plan import Plan
 
 Array = npt.NDArray[np.float64]
 LARGE, SMALL, PUSH = "large", "small", "push"
+WHOLE = 4  # small steps whose half-bridges are captured
 SLOWER = 8  # times: captures of positions, which are read every so many ticks
 WORTH_S = 2e-3  # of a capture of positions: its first and last stretch, and what each of those between is a mean over
 
@@ -58,9 +59,11 @@ def place_of(rig: RigFile, name: str) -> CurrentStep:
     return known[name]
 
 
-def channels(place: CurrentStep, kind: str) -> tuple[str, ...]:
-    """What is captured at a place: of a small step the half-bridges too, whose limits it must not touch."""
-    return place.still if kind == PUSH else place.captured
+def channels(place: CurrentStep, kind: str, repeat: int) -> tuple[str, ...]:
+    """What is captured at a place: of the first `WHOLE` small steps the half-bridges too, whose limits they must not touch."""
+    if kind == PUSH:
+        return place.still
+    return place.captured if kind == LARGE or repeat < WHOLE else (place.along, place.across)
 
 
 def read_taken(recording: Recording[Plan]) -> list[Taken]:
@@ -69,23 +72,23 @@ def read_taken(recording: Recording[Plan]) -> list[Taken]:
     Raises:
         AnalysisError: there are none, or one is missing.
     """
-    found = sorted((s for kind in (LARGE, SMALL) for s in recording.steps(kind)), key=lambda s: s.start_ns)
+    found = [(kind, step) for kind in (LARGE, SMALL) for step in recording.steps(kind)]
     if not found:
         raise AnalysisError("found no steps; expected those of the plan (was the run stopped early?)")
-    return [_read(recording, step) for step in found]
+    return [_read(recording, *one) for one in sorted(found, key=lambda one: one[1].start_ns)]
 
 
-def _read(recording: Recording[Plan], step: Step) -> Taken:
+def _read(recording: Recording[Plan], kind: str, step: Step) -> Taken:
     labels = step.labels
     place = place_of(recording.rig, str(labels["place"]))
-    data, tick_s = _captured(recording, step, place.captured)
+    data, tick_s = _captured(recording, step, channels(place, kind, int(labels["repeat"])))
 
     def rows(names: tuple[str, ...]) -> Array:
-        return np.array([data[n] for n in names]).reshape(len(names), -1)
+        return np.array([data[n] for n in names if n in data]).reshape(-1, len(data[place.along]))
 
-    supply = data[place.supply] if place.supply else np.empty(0)
+    supply = data.get(place.supply, np.empty(0))
     return Taken(
-        str(labels["kind"]), str(labels["place"]), float(labels["size_A"]), tick_s, data[place.along], data[place.across],
+        kind, str(labels["place"]), float(labels["size_A"]), tick_s, data[place.along], data[place.across],
         rows(place.voltages), rows(place.currents), supply, step.lost(), step.expected(),
     )  # fmt: skip
 
