@@ -164,9 +164,9 @@ class ControllerCapture:
         period_ns, count = self._ticks.ns(period), len(next(iter(data.columns.values())))
         channels = tuple(ChannelInfo(name, c.unit) for name, c in layout.channels.items())
         self._recorder.stream(StreamLayout(data.stream, period_ns, channels))
-        steps = np.arange(count)
+        steps = period * np.arange(count)
         self._recorder.samples(SampleBlock(
-            data.stream, 0, (data.first_tick + period * steps).astype(np.uint64), data.start_ns + self._ticks.all_ns(period * steps),
+            data.stream, 0, (data.first_tick + steps).astype(np.uint64), data.start_ns + self._ticks.all_ns(steps),
             self._clock.now_ns(), 0, data.columns,
         ))  # fmt: skip
         self._recorder.event(
@@ -231,8 +231,8 @@ class ControllerCapture:
         return WAITING * (length - min(reply["samples"], reply["trigger"])) * reply["divider"] * self._tick_s
 
     def _ask(self, message: str, values: dict[str, float]) -> dict[str, float]:
-        full, what = {**values, "session": self._session.number}, "the state of the capture"
-        return self._dialogue.ask(message, full, "CaptureStatus", what, self._wait)
+        full = {**values, "session": self._session.number}
+        return self._dialogue.ask(message, full, "CaptureStatus", "the state of the capture", self._wait)
 
     def _said(self, reply: dict[str, float]) -> tuple[str, str]:
         message = self._rig.messages["CaptureStatus"]

@@ -32,10 +32,10 @@ class Upload:
 
     def __init__(self, rig: RigFile, link: Link, dialogue: Dialogue, clock: Clock) -> None:
         self._rig, self._link, self._dialogue, self._clock = rig, link, dialogue, clock
-        serial = linkurl.parse(rig.link.url).scheme == "serial" or rig.commandline is not None
-        self._identifier = rig.messages["CaptureData" if serial else "CaptureBlock"].identifier
-        self._fetch = self._by_pieces if serial else self._by_blocks
-        self._form = rig.messages.code("CaptureRead", "form", "PIECES" if serial else "BLOCK")
+        pieces = linkurl.parse(rig.link.url).scheme in linkurl.PIECES_SCHEMES
+        self._identifier = rig.messages["CaptureData" if pieces else "CaptureBlock"].identifier
+        self._fetch = self._by_pieces if pieces else self._by_blocks
+        self._form = rig.messages.code("CaptureRead", "form", "PIECES" if pieces else "BLOCK")
         self._wanted = False
         self._came: list[bytes] = []
         self.failures = 0

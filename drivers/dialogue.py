@@ -190,8 +190,10 @@ class Dialogue:
         return next((v for n, v, _ in self._answers if n == reply and v["token"] == token), None)
 
     def send(self, message: str, values: Mapping[str, float]) -> None:
-        """Send a message as it is."""
+        """Send a message as it is; of one that knows no owner, without the session."""
         m = self._rig.messages[message]
+        if "session" in values and not _has(m, "session"):
+            values = {name: value for name, value in values.items() if name != "session"}
         batch = frame(m.identifier, encode(m, values), flags=SENT | (FD if m.fd else 0), t_ns=self._now_ns())
         self._go_out(batch if self._segments is None else self._segments.outgoing(batch))
 

@@ -38,8 +38,7 @@ class SimulatedRig:
         self, rig: RigFile, truth: Truth, session: int = 1, faults: Sequence[Fault] = (), substeps: int = 2
     ) -> None:
         on_link, in_device = divided(faults, simulated=True)
-        make = truth.machine.controller or SimulatedController
-        self.device = make(rig, truth, in_device, substeps)
+        self.device = (truth.machine.controller or SimulatedController)(rig, truth, in_device, substeps)
         self.truth = truth
         self.link = InProcessLink(rig, self, session, on_link)
         self._now = EPOCH_NS

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
+from bench.link.fault_injection import Fault
 from bench.rigfile import RigFile
 from bench.rigfile.toleranced import Toleranced
-from sim_backend.core import DriveLaw
+from sim_backend.core import PERIOD_TICKS, TICK_S, DriveLaw
 from sim_backend.draws import noise_seed
 from sim_backend.motion import NONE, Motions
 
@@ -91,7 +92,10 @@ class Machine:
         columns: of a machine whose rows are channels of the rig file, their names there; `channels` and `places` say nothing
             then.
         motions: what it truly does under a plan.
-        controller: what speaks for it in this process, and what is served, of rig, truth, faults and substeps; None: messages.
+        tick_s, period_s: of its controller, and from sample to sample of its telemetry.
+        controller: what speaks for it, of rig file, truth, faults in the device and integration steps in a tick; None: the
+            `SimulatedController` around its plant.
+        served: what stands behind real ports; None: the `SimulatedController`, too.
     """
 
     name: str
@@ -116,8 +120,10 @@ class Machine:
     columns: Callable[[RigFile], tuple[str, ...]] | None = None
     controls: frozenset[str] = frozenset()
     motions: Motions = NONE
-    controller: Callable[..., Any] | None = None
-    served: Callable[..., Any] | None = None
+    tick_s: float = TICK_S
+    period_s: float = PERIOD_TICKS * TICK_S
+    controller: Callable[[RigFile, Truth, Sequence[Fault], int], Any] | None = None
+    served: Callable[[RigFile, Truth, Sequence[Fault], int], Any] | None = None
 
 
 @dataclass(frozen=True)

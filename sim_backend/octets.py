@@ -6,8 +6,8 @@ from typing import Final
 
 from bench.link.frames import FrameBatch, batch_of, packed
 
-BYTES: Final = 0x7FF
-"""Identifier of frames that are no messages but bytes, up to 64 each."""
+BYTES: Final = 0x7FFFFFFF
+"""Identifier, of no bus, of frames that are no messages but bytes, up to 64 each."""
 
 
 def framed(data: bytes, t_ns: int) -> FrameBatch:

@@ -10,7 +10,6 @@ from bench.rigfile import RigFile
 from bench.rigfile.messages import MessageMap, load_messages
 from sim_backend.controller.controls import without_control
 from sim_backend.controller.meanings import FAULTS
-from sim_backend.core import PERIOD_TICKS, TICK_S
 from sim_backend.machine import Machine
 from sim_backend.spoken import own_words, tellable, told_as
 
@@ -38,10 +37,11 @@ def unspoken(rig: RigFile, machine: Machine) -> Iterator[Problem]:
 
 def _of_time(rig: RigFile, messages: MessageMap, machine: Machine) -> Iterator[Problem]:
     tick_s, first = rig.devices["controller"].tick_s, messages.messages.get(rig.binding.telemetry[0])
-    if abs(tick_s - TICK_S) > 1e-9:
-        yield Problem(rig.path, "devices.controller.tick_s", f"{tick_s:g} s", f"{TICK_S:g} s, that of {machine.name}")
-    if first is not None and abs(first.period_s - PERIOD_TICKS * TICK_S) > 1e-9:
-        expected = f"{PERIOD_TICKS * TICK_S:g} s, that of {machine.name}"
+    if abs(tick_s / machine.tick_s - 1) > 1e-5:
+        expected = f"{machine.tick_s:g} s, that of {machine.name}"
+        yield Problem(rig.path, "devices.controller.tick_s", f"{tick_s:g} s", expected)
+    if first is not None and abs(first.period_s - machine.period_s) > 1e-9:
+        expected = f"{machine.period_s:g} s, that of {machine.name}"
         yield Problem(rig.link.dbc, f'BA_ "GenMsgCycleTime" of {first.name}', f"{first.period_s:g} s", expected)
 
 

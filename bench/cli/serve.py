@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bench.cli.compose import with_links
+from bench.cli.opening import SUBSTEPS
 from bench.clock import WallClock
 from bench.errors import ConfigError
 from bench.link import fault_injection
@@ -63,7 +64,7 @@ def serve_command(request: ServeRequest) -> int:
         [fault_injection.parse(text) for text in request.faults], simulated=True
     )
     truth = draw(rig, request.seed, _overrides(request.truth), visit=request.visit)
-    controller = (truth.machine.served or SimulatedController)(rig, truth, in_device)
+    controller = (truth.machine.served or SimulatedController)(rig, truth, in_device, SUBSTEPS)
     wire = WireFaults(on_link, truth.noise, [rig.messages[name].identifier for name in rig.binding.telemetry])
     stopped: list[str] = []
     with ExitStack() as stack:

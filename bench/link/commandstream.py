@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import logging
 import re
+import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -59,6 +60,7 @@ class CommandStream:
         ] = {}  # a frame that waits for its reply: its tag and line
         self._own: list[tuple[int, bytes, int]] = []  # frames that the bench answers itself
         self._tag = -1
+        self._lock = threading.Lock()  # one thread sends, another receives
         self._last = b""  # telemetry
         self._due = b""
         self.counts = Counts()
@@ -77,10 +79,15 @@ class CommandStream:
     def encode(self, batch: FrameBatch) -> bytes:
         """Lines of the host's frames, in order; those without one are left out."""
         columns = zip(batch["id"].tolist(), batch["length"].tolist(), batch["data"], strict=True)
-        return b"".join(self._line(identifier, data[:length].tobytes()) for identifier, length, data in columns)
+        with self._lock:
+            return b"".join(self._line(identifier, data[:length].tobytes()) for identifier, length, data in columns)
 
     def feed(self, data: bytes, now_ns: int) -> FrameBatch:
         """The controller's frames that these bytes complete, stamped with `now_ns`."""
+        with self._lock:
+            return self._fed(data, now_ns)
+
+    def _fed(self, data: bytes, now_ns: int) -> FrameBatch:
         before = self._splitter.wrong
         out: list[bytes] = []
         for piece in self._splitter.feed(data):

@@ -26,6 +26,8 @@ MESSAGES: Final = (
     "CaptureBlock",
     "CaptureData",
 )
+BY_BLOCKS: Final = ("CaptureFlow", "CaptureBlock")
+"""Those of them that only a capture in blocks of ISO 15765-2 needs."""
 INDEXES: Final = 64
 LONGEST_DIVIDER: Final = 0xFFFF
 TYPES: Final = {"i16": "<i2", "u16": "<u2", "i32": "<i4", "u32": "<u4", "f32": "<f4"}

@@ -198,11 +198,8 @@ def _bindings(rig: RigFile, messages: MessageMap) -> Iterator[Problem]:
         elif channel.unit in units.UNITS and units.UNITS[dbc_unit].si != units.UNITS[channel.unit].si:
             yield Problem(rig.path, f"channels.{name}.unit", channel.unit, f"the kind of {dbc_unit} ({channel.signal})")
     yield from _signals_of_parameters(rig, messages)
-    captures = (
-        problems_of_capture(rig.capture, messages, on_a_line=rig.commandline is not None)
-        if rig.capture is not None
-        else ()
-    )
+    blocks = rig.link.url.partition(":")[0].lower() not in linkurl.PIECES_SCHEMES
+    captures = problems_of_capture(rig.capture, messages, blocks=blocks) if rig.capture is not None else ()
     spoken = problems_of_commandline(rig, messages)
     for key, found, expected in (
         *problems_of_binding(rig, messages), *problems_of_states(rig, messages), *captures, *spoken

@@ -5,20 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from bench import units
-from bench.rigfile.capture import MESSAGES, CaptureSpec
+from bench.rigfile.capture import BY_BLOCKS, MESSAGES, CaptureSpec
 from bench.rigfile.check_binding import Found, multiplexed
 from bench.rigfile.messages import MessageMap
 
-ON_A_BUS = ("CaptureFlow", "CaptureBlock")
-"""What a command line has no use for: its blocks are pieces."""
 
-
-def problems_of(spec: CaptureSpec, messages: MessageMap, *, on_a_line: bool = False) -> Iterator[Found]:
-    """Key, found and expected of what is wrong with the table `capture` of a controller (`on_a_line`: with a command line)."""
-    needed = [name for name in MESSAGES if not (on_a_line and name in ON_A_BUS)]
+def problems_of(spec: CaptureSpec, messages: MessageMap, *, blocks: bool = True) -> Iterator[Found]:
+    """Key, found and expected of what is wrong with the table `capture`; `blocks`: it comes in blocks, not in pieces."""
+    needed = (name for name in MESSAGES if blocks or name not in BY_BLOCKS)
     if missing := [name for name in needed if name not in messages.messages]:
         yield "capture", f"no message {', '.join(missing)} in the DBC", "the messages of docs/reference/captures.md"
-    yield from multiplexed((("capture", name) for name in needed), messages)
+    yield from multiplexed((("capture", name) for name in MESSAGES), messages)
     taken: dict[int, str] = {}
     for name, c in spec.channels.items():
         key = f"capture.channels.{name}"

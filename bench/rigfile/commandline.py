@@ -2,7 +2,8 @@
 one needs a rig file and no code. What `bench.wire.commandline` fixes (tags, checksums, events, blocks) is not said here.
 
 In a line, `{name}` stands for the value of that parameter as it was last set, `{value}` for the one that is set now, `{key}`
-for its own key; what has `words` stands for the word of its value. The number after the first `=` of a reply is the value in force.
+for its own key; what has `words` stands for the word of its value. The number after the first `=` of a reply is the value in
+force.
 """
 
 from __future__ import annotations

@@ -35,6 +35,8 @@ EXAMPLES = {
 }
 CONTROLLER_SCHEMES = ("inprocess", "slcan", "can", "serial", "cli")
 TCP_SCHEMES = ("modbus-tcp", "modbus-rtu-tcp", "line")
+PIECES_SCHEMES = ("serial", "cli")
+"""Links on which a capture comes in pieces; on the others it comes in blocks of ISO 15765-2."""
 MODBUS_SCHEMES = ("modbus-tcp", "modbus-rtu", "modbus-rtu-tcp")
 
 

@@ -9,7 +9,9 @@ ROLES = frozenset({"rotation", "motion", "drive"})
 
 def turned(rig: RigFile) -> bool:
     """Whether something may turn the shaft but a hand: a motor, a drive, a command that asks for it, or what counts its turns.
-    Schema 1 could not say, so there it may."""
+    Schema 1 could not say, so there it may. Motors of a shaft whose angle an encoder tells are no such thing: they turn it to
+    an angle and hold it there, as others move it along."""
     roles = {role for device in rig.devices.values() for role in device.roles}
-    stated = rig.motors or rig.mark is not None or rig.written_in == 1 or roles & ROLES
+    spun = rig.motors and not any(encoder.measures == "angle" for encoder in rig.encoders.values())
+    stated = spun or rig.mark is not None or rig.written_in == 1 or roles & ROLES
     return bool(stated or "speed" in rig.channels or "SPIN" in rig.binding.commands)

@@ -299,7 +299,7 @@ def test_a_bus_of_python_can_has_the_heartbeats_of_the_process() -> None:
         before = heart.counts()[0]
         wait_for(lambda: heart.counts()[0] > before, heart.renew_lease)
         assert heart.fault is None
-        with pytest.raises(ValueError, match="SLCAN"):
+        with pytest.raises(ValueError, match="takes lines"):
             heart.send_bytes(b"F\r")
 
 
@@ -308,7 +308,7 @@ def test_impossible_frames_are_counted_and_left_out() -> None:
         heart.send(np.concatenate([frame(0x011, bytes(9), flags=FD), frames(1)]))
         assert far.units(1) == [b"d01180000000000000000"]
         wait_for(lambda: heart.refused == 1, lambda: None)
-        with pytest.raises(ValueError, match="64"):
+        with pytest.raises(ValueError, match="whole lines"):
             heart.send_bytes(bytes(65))
 
 

@@ -37,7 +37,7 @@ typedef struct {
     double kp_s, ki_s, kp_sl, ki_sl, kp_v, ki_v, kp_i, current_max;
     double model_force, model_torque, model_bearing, model_mass, model_inertia, model_pull, model_cogging_force,
         model_cogging_torque, model_pitch, gravity;
-    double psi_rot, psi_lin, zero_ra1, zero_ra2, zero_la; /* Wb, rad electrical */
+    double psi_rot, psi_lin, zero_ra1, zero_ra2, zero_la, one_zero; /* Wb, rad electrical; 1: the first for both */
     double model_l_rot, model_l_lin, model_l_f, model_c;
     double inject_axis, inject_place, inject_amplitude, inject_hz;
     double z_lift, v_lift, v_land, z_off, gate_m, gate_s, refuse_m, lost_m, lost_s, trip_A, supply_V, watchdog_s, rest_s; /* after the way down */

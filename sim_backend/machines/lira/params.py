@@ -149,6 +149,7 @@ class ControlParams:
     zero_ra1: float = 0.0
     zero_ra2: float = 0.0
     zero_la: float = 0.0
+    one_zero: float = 0.0  # 1: planted, the first for both rotary actuators
     model_l_rot: float = 2.4e-3
     model_l_lin: float = 31e-3
     model_l_f: float = 80e-6

@@ -95,7 +95,7 @@ static INLINE double loop(const lira_control *c, lira_state *st, int j, int on, 
 
 /* phases by the encoders as the fast part will use them until the next reading */
 static void turn(const lira_control *c, lira_state *st) {
-    const double zero[2] = {c->zero_ra1, c->zero_ra2};
+    const double zero[2] = {c->zero_ra1, c->one_zero != 0 ? c->zero_ra1 : c->zero_ra2};
     for (int a = 0; a < 2; a++) {
         st->cos_ra[a] = cos(POLE_PAIRS * st->read[ANGLE] - zero[a]);
         st->sin_ra[a] = sin(POLE_PAIRS * st->read[ANGLE] - zero[a]);

@@ -1,5 +1,5 @@
-"""The firmware's serial line: what goes out takes its time, blocks of a capture fill what lines and telemetry leave, and nothing
-is put inside a block."""
+"""The firmware's serial line: what goes out takes its time, blocks of a capture fill what lines and telemetry leave, and
+nothing is put inside a block."""
 
 from __future__ import annotations
 
