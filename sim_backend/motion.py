@@ -167,13 +167,14 @@ class SpeedsAsked:
 class CurrentAsked:
     """Steps of currents that the controller regulates, of the machine at rest: by place the current, as the machine calls it,
     and the proportional gain of its loop, V/A; the `size` of a large step and of a `small` one, A; what of the response counts,
-    s."""
+    s; the `angle` at which the mover was held, rad: it creeps before, and a limit of the half-bridges goes with it."""
 
     steps: Mapping[str, str]
     gains: Mapping[str, float]
     size: float
     small: float
     response_s: float
+    angle: float = 0.0
 
 
 @dataclass(frozen=True)

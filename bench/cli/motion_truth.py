@@ -233,6 +233,7 @@ def _derivative(done: Simulated) -> Found:
 
 
 def _currents(done: Simulated) -> Found:
+    from procedures.current_step.steps import LARGE
     from sim_backend.motion import CurrentAsked
 
     plan: Any = done.recording.plan
@@ -242,7 +243,9 @@ def _currents(done: Simulated) -> Found:
     stepped = {name: rig.capabilities.current_steps[name] for name in plan.steps_at}
     steps = {name: step.parameter.removeprefix("step_") for name, step in stepped.items()}
     gains = {name: rig.parameters[step.gain].default for name, step in stepped.items() if step.gain}
-    asked = CurrentAsked(steps, gains, plan.size_A, plan.small_A, plan.response_s)
+    encoder = next((e.channel for e in rig.encoders.values() if e.measures == "angle"), "")
+    angle = next(iter(done.recording.steps(LARGE))).mean(encoder) if encoder else 0.0
+    asked = CurrentAsked(steps, gains, plan.size_A, plan.small_A, plan.response_s, angle)
     for (name, where), value in currents(rig, done.drawn, asked).items():
         yield name, where, value
 

@@ -21,6 +21,7 @@ from procedures.shared.certificates import certified, certified_gain
 
 Array = npt.NDArray[np.float64]
 LEAD_S = 0.5e-3  # of a response before its step
+ACROSS_RISES = 3  # rise times after a step: up to then the current across is looked at
 
 
 @dataclass(frozen=True)
@@ -102,7 +103,8 @@ def _place(name: str, taken: Sequence[Taken], rig: RigFile, plan: Plan) -> Place
              "fall_time": _time("fall_time", name, downs, tick_s, count / plan.size_A)}  # fmt: skip
     found["rise_bandwidth"] = 1 / (found["rise_time"] * 3.0)
     found["overshoot"] = _peak("overshoot", name, ups - 1, False)
-    found["across"] = _peak("across", name, across, True)
+    shown = before + round(ACROSS_RISES * found["rise_time"].value / tick_s)
+    found["across"] = _peak("across", name, across[:, :shown], True)
     found["bandwidth_small"] = _band(name, pairs, tick_s)
     found |= _design(rig, step) | _supply(rig, step, large)
     whole = [t for t in small if len(t.currents) == len(step.currents)]
@@ -126,10 +128,16 @@ def _count(rig: RigFile, channel: str) -> float:
     return 0.0 if rig.capture is None else rig.capture.channels[channel].scale
 
 
-def _scatter(value: float, u: float, unit: str, identity: str, count: int) -> Estimate:
-    return Estimate.of(
-        value, Influence(f"scatter/{identity}", "scatter of the repeats", u, unit, "A", "normal", count - 1)
-    )
+def _scatter(value: float, u: float, unit: str, identity: str, dof: int) -> Estimate:
+    return Estimate.of(value, Influence(f"scatter/{identity}", "scatter of the repeats", u, unit, "A", "normal", dof))
+
+
+def _by_mean(each: Array, of: Callable[[Array], float]) -> tuple[float, float]:
+    """A number of the mean of repeats (r, n), and its standard uncertainty by the jackknife: of single repeats a crossing is
+    early where noise crosses first."""
+    total, count = each.sum(axis=0), len(each)
+    less = [of((total - one) / (count - 1)) for one in each]
+    return of(total / count), math.sqrt((count - 1) * float(np.var(less)))
 
 
 def _known(u: float, unit: str, identity: str, name: str, source: str) -> Estimate:
@@ -137,29 +145,28 @@ def _known(u: float, unit: str, identity: str, name: str, source: str) -> Estima
 
 
 def _time(quantity: str, name: str, each: Array, tick_s: float, count: float) -> Estimate:
-    """Mean of the repeats from 10 to 90 %, s; `count` is what the capture rounds to, of the step."""
-    times = np.array([fit.rise(h) for h in each]) * tick_s
+    """From 10 to 90 % of the mean of the repeats, s; `count` is what the capture rounds to, of the step."""
+    value, u = _by_mean(each, fit.rise)
     mean, identity = each.mean(axis=0), f"{quantity}/{name}"
-    at = [int(np.argmax(mean >= level)) for level in (fit.LOW, fit.HIGH)]
+    at = fit.passed(mean)
     slopes = [float(mean[k] - mean[k - 1]) / tick_s for k in at]
-    out = _scatter(float(times.mean()), times.std(ddof=1) / math.sqrt(len(times)), "s", identity, len(times))
-    out = out + _known(fit.bent(mean) * tick_s / math.sqrt(3), "s", f"sampling/{identity}", "between two samples",
-                       "the bend of the response between samples")  # fmt: skip
-    rounded = count / math.sqrt(12) * math.hypot(*(1 / s for s in slopes)) / math.sqrt(len(times))
+    out = _scatter(value * tick_s, u * tick_s, "s", identity, len(each) - 1)
+    bend = abs(fit.straight(mean) - value) * tick_s
+    out = out + _known(bend / math.sqrt(3), "s", f"sampling/{identity}", "between two samples",
+                       "what a cubic and a straight line between samples differ by")  # fmt: skip
+    rounded = count / math.sqrt(12) * math.hypot(*(1 / s for s in slopes)) / math.sqrt(len(each))
     return out + _known(rounded, "s", f"count/{identity}", "the capture's count", "scale of the channel")
 
 
 def _peak(quantity: str, name: str, each: Array, either_way: bool) -> Estimate:
     value, u = fit.farthest(each, either_way)
-    return _scatter(max(value, 0.0), u, "1", f"{quantity}/{name}", len(each))
+    return _scatter(max(value, 0.0), u, "1", f"{quantity}/{name}", len(each) - 2)
 
 
 def _band(name: str, pairs: Array, tick_s: float) -> Estimate:
-    """-3 dB of the mean of the small steps, up and back; scatter by the jackknife."""
-    total, count = pairs.sum(axis=0), len(pairs)
-    each = np.array([fit.bandwidth((total - one) / (count - 1), tick_s) for one in pairs])
-    u = math.sqrt((count - 1) * float(np.var(each)))
-    return _scatter(fit.bandwidth(total / count, tick_s), u, "Hz", f"bandwidth_small/{name}", count)
+    """-3 dB of the mean of the small steps, up and back."""
+    value, u = _by_mean(pairs, lambda h: fit.bandwidth(h, tick_s))
+    return _scatter(value, u, "Hz", f"bandwidth_small/{name}", len(pairs) - 1)
 
 
 def _design(rig: RigFile, step: CurrentStep) -> dict[str, Estimate]:

@@ -13,6 +13,7 @@ from procedures.current_step.estimates import Place
 from procedures.current_step.plan import Plan
 
 Array = npt.NDArray[np.float64]
+BEGUN = 0.01  # of a step: from there on it is seen
 SHOWN_RISES = 4.0  # after the step
 
 
@@ -28,9 +29,14 @@ def _window(p: Place) -> slice:
     return slice(max(p.lead - after // 3, 0), p.lead + after)
 
 
+def _begun(p: Place) -> int:
+    """The last sample before the step is seen."""
+    return int(np.flatnonzero(p.along.mean(axis=0)[: p.lead] < BEGUN)[-1])
+
+
 def _ms(p: Place) -> Array:
     at = _window(p)
-    return np.asarray((np.arange(p.along.shape[1])[at] - p.lead) * p.tick_s * 1e3, np.float64)
+    return np.asarray((np.arange(p.along.shape[1])[at] - _begun(p)) * p.tick_s * 1e3, np.float64)
 
 
 def _step(p: Place, plan: Plan) -> Figure:
@@ -47,7 +53,7 @@ def _step(p: Place, plan: Plan) -> Figure:
     )
     return Figure(
         f"step-{p.name}", f"Large step at {p.name}",
-        f"Mean of {len(p.along)} steps of {size:g} A, time from where the current is half way. 10 to 90 % takes "
+        f"Mean of {len(p.along)} steps of {size:g} A, time from where the current begins to move. 10 to 90 % takes "
         f"{rise.value * 1e3:.4g} ms. Below, the current across, less that before the step.",
         "time / ms", f"{p.step.along} / A", (Series("along", t, size * d), reference),
         lines=(("10 %", 0.1 * size), ("90 %", 0.9 * size)), below=below,
@@ -67,8 +73,8 @@ def _bridges(p: Place) -> list[Figure]:
         inductance = limits.inductance
         sent = fit.given(taken.voltages, taken.currents, inductance, taken.tick_s)[:, rows]
         half = limits.voltage_limit
-        ends = () if half != half else (("half of the supply", half), ("", -half))
-        names = [Series(name, t[: sent.shape[1]], v, "faint") for name, v in zip(p.step.voltages, sent, strict=True)]
+        ends = () if half != half else (("half of the supply", half), ("less half of it", -half))
+        names = [Series("half-bridges", t[: sent.shape[1]], v) for v in sent]
         below = Figure(f"voltages-{p.name}", "", "", "time / ms", "given / V", tuple(names), lines=ends)
     lines = () if limits.current_limit != limits.current_limit else (("limit of the controller", limits.current_limit),)
     caption = (

@@ -1,7 +1,7 @@
 """The bare model: steps in a sampled current, the time between two levels, the response of the small signal, what limits.
 
 A step is found by where the current passes the half of it. Its levels are means: before the step, and before the next one.
-Crossings lie between samples on straight lines; what the curve bends between two of them is told beside.
+Crossings lie between samples, on the cubic through two on either side.
 
 The frequency response is that of the step's derivative: with differences d_k of the samples of a response that goes from 0 to 1,
 
@@ -82,42 +82,53 @@ def unit(y: Array, edge: Edge, before: int, after: int) -> Array:
     return (cut(y, edge, before, after) - edge.before) / edge.size
 
 
-def crossing(h: Array, level: float, start: int) -> tuple[float, float]:
-    """Where a response (n,) that is beyond a level at `start` or after it passes that level: the last time before it stays
-    beyond until the first sample of 0.9; index, and slope per sample there.
+def crossing(h: Array, level: float, k: int) -> float:
+    """Where a response (n,) passes a level between the samples k - 1 and k, by the cubic through two on either side; index.
 
     Raises:
-        AnalysisError: it does not pass it.
+        AnalysisError: there are not so many samples.
     """
-    beyond = np.flatnonzero(h[start:] >= level)
-    if not len(beyond) or start + beyond[0] == 0:
-        raise AnalysisError(f"a step does not pass {level:.0%} of its size")
-    k = start + int(beyond[0])
-    slope = float(h[k] - h[k - 1])
-    return k - 1 + (level - float(h[k - 1])) / slope, slope
+    if not 2 <= k < len(h) - 1:
+        raise AnalysisError(f"a step passes {level:.0%} of its size at the end of what was captured of it")
+    a, b, c, d = (float(x) - level for x in h[k - 2 : k + 2])
+    low, high = 0.0, 1.0
+    for _ in range(40):
+        t = 0.5 * (low + high)
+        y = b + t * (
+            (c - b) - (1 - t) / 2 * ((c - 2 * b + a) + (1 + t) / 3 * (d - 3 * c + 3 * b - a))
+        )  # Newton's form: differences of b, c; then a; then d
+        low, high = (t, high) if y < 0 else (low, t)
+    return k - 1 + low
+
+
+def passed(h: Array) -> tuple[int, int]:
+    """The first samples of a response (n,) beyond 10 % and beyond 90 %: that of 90 %, and before it the one after the last below
+    10 %, since noise about 10 % does not begin a rise.
+
+    Raises:
+        AnalysisError: it does not pass them.
+    """
+    end = int(np.argmax(h >= HIGH))
+    under = np.flatnonzero(h[:end] < LOW)
+    if h[end] < HIGH or not len(under):
+        raise AnalysisError("a step does not go from 10 to 90 % of its size")
+    return int(under[-1]) + 1, end
 
 
 def rise(h: Array) -> float:
     """Samples from 10 to 90 % of a response (n,)."""
-    end = int(np.argmax(h >= HIGH))
-    if h[end] < HIGH:
-        raise AnalysisError("a step does not pass 90% of its size")
-    under = np.flatnonzero(h[:end] < LOW)  # the last sample below: noise about 10 % does not begin a rise
-    if not len(under):
-        raise AnalysisError("a step begins above 10% of its size")
-    return crossing(h, HIGH, end)[0] - crossing(h, LOW, int(under[-1]) + 1)[0]
+    low, high = passed(h)
+    return crossing(h, HIGH, high) - crossing(h, LOW, low)
 
 
-def bent(h: Array) -> float:
-    """By how many samples a rise may be wrong since straight lines join the samples of a response (n,) without noise: a quarter
-    of the second difference over the slope, which is an eighth at the middle between two, twice for two that differ."""
-    out = 0.0
-    for level in (LOW, HIGH):
-        k = int(np.argmax(h >= level))
-        if 2 <= k < len(h) - 1:
-            bend = max(abs(h[k] - 2 * h[k - 1] + h[k - 2]), abs(h[k + 1] - 2 * h[k] + h[k - 1]))
-            out += float(bend / (8 * (h[k] - h[k - 1])))
-    return out
+def straight(h: Array) -> float:
+    """The same on straight lines between samples: what both differ by is more than what a cubic leaves."""
+    low, high = passed(h)
+
+    def at(k: int, level: float) -> float:
+        return k - 1 + float((level - h[k - 1]) / (h[k] - h[k - 1]))
+
+    return at(high, HIGH) - at(low, LOW)
 
 
 def gains(h: Array, hz: Array, tick_s: float) -> npt.NDArray[np.complex128]:

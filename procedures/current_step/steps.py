@@ -18,7 +18,7 @@ Array = npt.NDArray[np.float64]
 LARGE, SMALL, PUSH = "large", "small", "push"
 WHOLE = 4  # small steps whose half-bridges are captured
 SLOWER = 8  # times: captures of positions, which are read every so many ticks
-WORTH_S = 2e-3  # of a capture of positions: its first and last stretch, and what each of those between is a mean over
+WORTH_S = 5e-4  # what positions are means over
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Taken:
 
 @dataclass(frozen=True)
 class Pushed:
-    """Positions under a held step: how far each went from where it was, m (the mean of a stretch that is farthest)."""
+    """Positions under a held step: how much farther each went than it did before, m."""
 
     place: str
     moved: Mapping[str, float]
@@ -100,14 +100,18 @@ def read_pushed(recording: Recording[Plan]) -> list[Pushed]:
         place = place_of(recording.rig, str(step.labels["place"]))
         data, tick_s = _captured(recording, step, place.still)
         count = max(round(WORTH_S / tick_s), 1)
-        out.append(Pushed(str(step.labels["place"]), {name: moved(data[name], count) for name in place.still}))
+        before = round(recording.plan.push_s / tick_s)
+        out.append(Pushed(str(step.labels["place"]), {name: moved(data[name], count, before) for name in place.still}))
     return out
 
 
-def moved(x: Array, count: int) -> float:
-    """How far the mean of a stretch of `count` samples of a position (n,) is from that of the first one, at most, m."""
+def moved(x: Array, count: int, before: int) -> float:
+    """How much farther a position (n,) goes from its mean over the samples `before` than it went among those, m: a mover in its
+    rings may rock. By means of `count` samples, so that noise is no motion."""
     each = x[: len(x) // count * count].reshape(-1, count).mean(axis=1)
-    return float(np.abs(each - each[0]).max()) if len(each) else 0.0
+    first = each[: max(before // count, 1)]
+    away = np.abs(each - first.mean())
+    return float(away.max() - away[: len(first)].max())
 
 
 def _captured(recording: Recording[Plan], step: Step, names: tuple[str, ...]) -> tuple[dict[str, Array], float]:

@@ -36,13 +36,14 @@ class Stepped:
     Args:
         params: of the plant as drawn.
         control: the firmware's parameters.
-        angle: at which the mover was left, rad.
+        angle: at which the mover is held, rad.
     """
 
     def __init__(self, params: PlantParams, control: ControlParams, angle: float = 0.0) -> None:
         self._plant = Plant(ideal(params), 0, control=control)
-        self._plant.put(angle=angle)
         self._plant.run(FALL_S, 0)
+        self._plant.put(angle=angle, angle_rate=0.0)
+        self._plant.run(1e-4, 0)  # it is held where it was read last
         for command in ("idle", "on"):
             self._plant.command(command)
         self._calm(CALM_S)
@@ -91,11 +92,16 @@ def bandwidth(h: Array) -> float:
     return float(brentq(lambda f: gain(f) - MINUS_3_DB, hz[k - 1], hz[k]))
 
 
+def _half(h: Array) -> int:
+    """The first tick beyond the half of a response."""
+    return int(np.argmax(h >= 0.5))
+
+
 def currents(rig: RigFile, drawn: Truth, asked: CurrentAsked) -> Mapping[tuple[str, str], float]:
     """Of every place its times, bands, overshoot and what goes across; the supply."""
     built = drawn.plant
     out: dict[tuple[str, str], float] = {("u_dc", ""): built.plant.supply}
-    stepped = Stepped(built.plant, built.control, built.rest_angle)
+    stepped = Stepped(built.plant, built.control, asked.angle)
     count = round(asked.response_s * TICKS_S)
     for place, name in asked.steps.items():
         along, across = (x / asked.size for x in stepped.step(name, asked.size))
@@ -106,7 +112,7 @@ def currents(rig: RigFile, drawn: Truth, asked: CurrentAsked) -> Mapping[tuple[s
         out |= {
             ("rise_time", place): time, ("rise_bandwidth", place): 1 / (3 * time), ("fall_time", place): rise(back),
             ("overshoot", place): max(float(along[:count].max()) - 1, 0.0),
-            ("across", place): float(np.abs(across[:count]).max()), ("bandwidth_small", place): bandwidth(small),
+            ("across", place): float(np.abs(across[: _half(along) + round(3 * time * TICKS_S)]).max()), ("bandwidth_small", place): bandwidth(small),
         }  # fmt: skip
         if (inductance := _inductance(built.plant, name)) and place in asked.gains:
             out["bandwidth_design", place] = asked.gains[place] / (2 * np.pi * inductance)
