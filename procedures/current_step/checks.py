@@ -36,9 +36,9 @@ def _stepped(mine: Sequence[Taken], kind: str, place: str, plan: Plan) -> Iterat
     missing = sum(e is None for e in found)
     if missing:
         text = (
-            f"in {missing} of {len(mine)} captures of the {kind} step the current does not go by half of {mine[0].size:g} A and "
-            "back: the step did not come, it came outside of the capture, or the loop does not follow. Look at the reference, at "
-            "spare_s, and whether the current loops are switched on."
+            f"in {missing} of {len(mine)} captures of the {kind} step the current does not go by half of {mine[0].size:g} A "
+            "and back: the step did not come, it came outside of the capture, or the loop does not follow. Look at the "
+            "reference, at spare_s, and whether the current loops are switched on."
         )
         yield Finding("current-not-stepped", text, place, Effect.ERROR)
         return
@@ -50,8 +50,8 @@ def _stepped(mine: Sequence[Taken], kind: str, place: str, plan: Plan) -> Iterat
         yield Finding("current-not-stepped", text, place, Effect.ERROR)
     elif max(abs(size), abs(drift)) > plan.max_unsettled:
         text = (
-            f"the current does not come to rest where it was told to: the {kind} step is off by {size:+.2%} of its size at its end "
-            f"and drifts by {drift:+.2%} of it there ({plan.max_unsettled:.2%} is allowed). Hold it longer, or look for "
+            f"the current does not come to rest where it was told to: the {kind} step is off by {size:+.2%} of its size at its "
+            f"end and drifts by {drift:+.2%} of it there ({plan.max_unsettled:.2%} is allowed). Hold it longer, or look for "
             "what pulls at it: a loop without integrator, a reference that another loop moves, a sensor's gain."
         )
         yield Finding("current-not-settled", text, place, Effect.INDETERMINATE)
@@ -76,12 +76,15 @@ def of_result(places: Sequence[Place]) -> Iterator[Finding]:
         large, small = p.limits[LARGE], p.limits[SMALL]
         said = _said(large)
         if large.current_touched or large.voltage_touched:
-            text = f"the large step touches its limits: {said}. Its rise time is that of a saturated step and goes with the supply."
+            text = (
+                f"the large step touches its limits: {said}. Its rise time is that of a saturated step and goes with the "
+                "supply."
+            )
             yield Finding("limit-touched", text, p.name)
         elif said:
             text = (
-                f"the large step touches no limit: {said}. Its rise time is not that of a saturated step, and the small step has "
-                "the same. Step by more, or look whether the loop's gain is as told."
+                f"the large step touches no limit: {said}. Its rise time is not that of a saturated step, and the small step "
+                "has the same. Step by more, or look whether the loop's gain is as told."
             )
             concerns = tuple(f"{name}@{p.name}" for name in ("rise_time", "fall_time", "rise_bandwidth"))
             yield Finding("limit-untouched", text, p.name, Effect.INDETERMINATE, concerns)

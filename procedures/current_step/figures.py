@@ -1,4 +1,4 @@
-"""What a stepped current draws: along and across over time, half-bridges beside their limits, the small signal over frequency."""
+"""What a stepped current draws: along and across over time, half-bridges beside limits, the small signal over frequency."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def _band(places: Sequence[Place], plan: Plan) -> Figure:
     both = tuple(s for pair in zip(series, marks, strict=True) for s in pair)
     return Figure(
         "small", "Small signal over frequency",
-        f"Fourier transform of the derivative of the response to steps of {plan.small_A:g} A, mean of {plan.small_repeats} up and back. "
-        "What a rise time says as 1/(3 t_r), and the bandwidth by design, are other quantities.",
+        f"Fourier transform of the derivative of the response to steps of {plan.small_A:g} A, mean of "
+        f"{plan.small_repeats} up and back. What a rise time says as 1/(3 t_r), and the bandwidth by design, are others.",
         "frequency / kHz", "gain / 1", both, lines=(("−3 dB", fit.MINUS_3_DB),), log_x=True, log_y=True,
     )  # fmt: skip

@@ -3,7 +3,7 @@
 A step is found by where the current passes the half of it. Its levels are means: before the step, and before the next one.
 Crossings lie between samples, on the cubic through two on either side.
 
-The frequency response is that of the step's derivative: with differences d_k of the samples of a response that goes from 0 to 1,
+The frequency response is that of the step's derivative: with differences d_k of the samples of a response from 0 to 1,
 
     H(f) = sum_k d_k exp(-2 pi i f k T) / (sin(pi f T)/(pi f T)),
 
@@ -102,8 +102,8 @@ def crossing(h: Array, level: float, k: int) -> float:
 
 
 def passed(h: Array) -> tuple[int, int]:
-    """The first samples of a response (n,) beyond 10 % and beyond 90 %: that of 90 %, and before it the one after the last below
-    10 %, since noise about 10 % does not begin a rise.
+    """The first samples of a response (n,) beyond 10 % and beyond 90 %: before that of 90 % the one after the last
+    below 10 %, since noise about 10 % does not begin a rise.
 
     Raises:
         AnalysisError: it does not pass them.

@@ -46,7 +46,11 @@ SMALL_BAND = Quantity("bandwidth_small", "Hz", "-3 dB of the small step's respon
 DESIGN = Quantity("bandwidth_design", "Hz", "proportional gain over 2 pi times the stated inductance: computed, not measured",
                   title="bandwidth by design")  # fmt: skip
 OVERSHOOT = Quantity("overshoot", "1", "of the large step beyond where it comes to rest, over its size")
-ACROSS = Quantity("across", "1", "largest current across a large step up to three rise times after it, less that before, over its size")
+ACROSS = Quantity(
+    "across",
+    "1",
+    "largest current across a large step up to three rise times after it, less that before, over its size",
+)
 U_DC = Quantity("u_dc", "V", "voltage of the DC link before the large steps", title="supply")
 MEASURES = (RISE, RISE_BAND, SMALL_BAND, DESIGN, ACROSS, OVERSHOOT, FALL, U_DC)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 from bench.rigfile import RigFile
@@ -55,13 +55,14 @@ TARGETS = {
 
 @dataclass(frozen=True)
 class Built:
-    """A linear-rotary actuator: its plant, the firmware's parameters, whether it runs as the reduced model, and the angle at
-    which it was left, rad."""
+    """A linear-rotary actuator: its plant, the firmware's parameters, whether it runs as the reduced model, the angle at
+    which it was left, rad, and what of its parameters the firmware works with, as `Plant` has them."""
 
     plant: PlantParams
     control: ControlParams
     reduced: bool = False
     rest_angle: float = 0.0
+    factors: Mapping[str, float] = field(default_factory=dict)
 
 
 def stated(rig: RigFile) -> dict[str, Toleranced]:
@@ -93,9 +94,9 @@ def params(v: Numbers, d: Numbers) -> Built:
         ring_friction=v["ring_friction"],
     )  # fmt: skip
     known = ControlParams(observer_pull=0.0 if d["no_pull"] else 1.0, one_zero=d["one_zero"])
-    changed = {name: getattr(known, name) * d[f"factor_{name}"] for name in FACTORS}
-    control = replace(known, supply_V=v.get("firmware_supply", known.supply_V), **changed)
-    return Built(plant, control, v["reduced"] != 0, v["rest_angle"])
+    control = replace(known, supply_V=v.get("firmware_supply", known.supply_V))
+    factors = {name: d[f"factor_{name}"] for name in FACTORS if d[f"factor_{name}"] != 1}
+    return Built(plant, control, v["reduced"] != 0, v["rest_angle"], factors)
 
 
 def _moved(v: Numbers) -> dict[str, Any]:
@@ -200,7 +201,7 @@ def quantities(p: Built, _: Numbers) -> dict[str, float]:
 
 def make(p: Built, seed: int, _substeps: int) -> Any:
     """The plant itself, its mover as it was left: in the rings, at its angle."""
-    plant = Plant(p.plant, seed, control=p.control, reduced=p.reduced)
+    plant = Plant(p.plant, seed, control=p.control, reduced=p.reduced, factors=p.factors)
     plant.put(angle=p.rest_angle)
     return plant
 

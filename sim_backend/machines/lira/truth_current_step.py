@@ -1,6 +1,6 @@
-"""What the machine's stepped currents truly do: the machine as it was drawn, with the gains and the late instants of the sensors
-that its loops work with, but without noise, rounding and ripple. By a spline through every tick, and so by another way than a
-procedure.
+"""What the machine's stepped currents truly do: the machine as it was drawn, with the gains and the late instants of the
+sensors that its loops work with, but without noise, rounding and ripple. By a spline through every tick, and so by another way
+than a procedure.
 
 Where a step comes to rest is its reference: the loops integrate. A position loop that moves another current's reference
 meanwhile works in the truth as it does in the run.
@@ -37,10 +37,17 @@ class Stepped:
         params: of the plant as drawn.
         control: the firmware's parameters.
         angle: at which the mover is held, rad.
+        factors: planted in the firmware, as `Plant` has them.
     """
 
-    def __init__(self, params: PlantParams, control: ControlParams, angle: float = 0.0) -> None:
-        self._plant = Plant(ideal(params), 0, control=control)
+    def __init__(
+        self,
+        params: PlantParams,
+        control: ControlParams,
+        angle: float = 0.0,
+        factors: Mapping[str, float] | None = None,
+    ) -> None:
+        self._plant = Plant(ideal(params), 0, control=control, factors=factors)
         self._plant.run(FALL_S, 0)
         self._plant.put(angle=angle, angle_rate=0.0)
         self._plant.run(1e-4, 0)  # it is held where it was read last
@@ -101,7 +108,7 @@ def currents(rig: RigFile, drawn: Truth, asked: CurrentAsked) -> Mapping[tuple[s
     """Of every place its times, bands, overshoot and what goes across; the supply."""
     built = drawn.plant
     out: dict[tuple[str, str], float] = {("u_dc", ""): built.plant.supply}
-    stepped = Stepped(built.plant, built.control, asked.angle)
+    stepped = Stepped(built.plant, built.control, asked.angle, built.factors)
     count = round(asked.response_s * TICKS_S)
     for place, name in asked.steps.items():
         along, across = (x / asked.size for x in stepped.step(name, asked.size))
@@ -112,7 +119,8 @@ def currents(rig: RigFile, drawn: Truth, asked: CurrentAsked) -> Mapping[tuple[s
         out |= {
             ("rise_time", place): time, ("rise_bandwidth", place): 1 / (3 * time), ("fall_time", place): rise(back),
             ("overshoot", place): max(float(along[:count].max()) - 1, 0.0),
-            ("across", place): float(np.abs(across[: _half(along) + round(3 * time * TICKS_S)]).max()), ("bandwidth_small", place): bandwidth(small),
+            ("across", place): float(np.abs(across[: _half(along) + round(3 * time * TICKS_S)]).max()),
+            ("bandwidth_small", place): bandwidth(small),
         }  # fmt: skip
         if (inductance := _inductance(built.plant, name)) and place in asked.gains:
             out["bandwidth_design", place] = asked.gains[place] / (2 * np.pi * inductance)
