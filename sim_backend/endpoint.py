@@ -9,7 +9,7 @@ import numpy as np
 from bench.errors import LinkError
 from bench.link import LinkStats
 from bench.link.codec import encode
-from bench.link.fault_injection import CUTS, Fault, divided
+from bench.link.fault_injection import CUTS, Fault, divided, of_a_line
 from bench.link.frame_faults import FrameFaults, lost
 from bench.link.frames import ERROR, FD, SENT, FrameBatch, batch_of, by_time, empty_batch, joined, packed
 from bench.link.payloads import put
@@ -38,6 +38,8 @@ class SimulatedRig:
         self, rig: RigFile, truth: Truth, session: int = 1, faults: Sequence[Fault] = (), substeps: int = 2
     ) -> None:
         on_link, in_device = divided(faults, simulated=True)
+        if truth.machine.controller is not None:
+            on_link, in_device = of_a_line(on_link, in_device)
         self.device = (truth.machine.controller or SimulatedController)(rig, truth, in_device, substeps)
         self.truth = truth
         self.link = InProcessLink(rig, self, session, on_link)

@@ -64,6 +64,8 @@ def serve_command(request: ServeRequest) -> int:
         [fault_injection.parse(text) for text in request.faults], simulated=True
     )
     truth = draw(rig, request.seed, _overrides(request.truth), visit=request.visit)
+    if truth.machine.served is not None:
+        on_link, in_device = fault_injection.of_a_line(on_link, in_device)
     controller = (truth.machine.served or SimulatedController)(rig, truth, in_device, SUBSTEPS)
     wire = WireFaults(on_link, truth.noise, [rig.messages[name].identifier for name in rig.binding.telemetry])
     stopped: list[str] = []

@@ -116,6 +116,13 @@ def divided(faults: Iterable[Fault], *, simulated: bool) -> tuple[list[Fault], l
     return link, device
 
 
+def of_a_line(link: Sequence[Fault], device: Sequence[Fault]) -> tuple[list[Fault], list[Fault]]:
+    """The same division for a simulated controller that knows what its line is made of: what hits single lines and blocks
+    happens there, and only what cuts the link or holds it up beside it."""
+    outside = [f for f in link if f.kind not in SHARES]
+    return outside, [*(f for f in link if f.kind in SHARES), *device]
+
+
 def announced(faults: Sequence[Fault]) -> Finding:
     """What the record of a run must say when its troubles were made."""
     return Finding("faults-injected", f"faults were injected on purpose: {', '.join(map(str, faults))}", "link")

@@ -37,7 +37,7 @@ class Host:
     def wait(self, seconds: float) -> None:
         """With heartbeats."""
         for _ in range(max(1, round(seconds / 0.02))):
-            self.ask("hb", "1")
+            self.ask("hb", str(self._tag))
             self._read(self.device.advance(min(seconds, 0.02)), replies=False)
 
     def _read(self, data: bytes, *, replies: bool = True) -> Reply:

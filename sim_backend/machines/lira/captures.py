@@ -21,6 +21,10 @@ class Captures:
         """The capture that samples are still missing of."""
         return None if self._capture is None or self._capture.full else self._capture
 
+    def forget(self) -> None:
+        """As after power-on."""
+        self._capture, self._count = None, 0
+
     def stepped(self) -> None:
         """A current's set point was stepped."""
         if self._capture is not None:

@@ -13,6 +13,7 @@ from bench.link.frames import FrameBatch, joined
 from bench.rigfile import RigFile, linkurl
 from sim_backend.machine import Truth
 from sim_backend.machines.lira.device import Device
+from sim_backend.machines.lira.linefaults import KINDS, LineFaults
 from sim_backend.machines.lira.plant import TICKS_S
 from sim_backend.machines.lira.uart import Uart
 from sim_backend.octets import BYTES, framed, unframed
@@ -21,6 +22,7 @@ TICKS: Final = 56
 """Of the machine in one of this controller: whole readings of the positions, and whole nanoseconds."""
 TICK_NS: Final = TICKS * 10**9 // TICKS_S
 SLICE: Final = 5  # ticks from look to look at the line
+FASTEST: Final = 3_000_000  # Bd, where the URL says nothing
 
 
 class LineController:
@@ -29,10 +31,10 @@ class LineController:
     Args:
         rig: its table `commandline`.
         truth: which machine it has.
-        faults: none so far.
+        faults: of its line and in it (`linefaults.KINDS`).
 
     Raises:
-        ConfigError: a fault.
+        ConfigError: a fault of another kind.
     """
 
     tick_ns = TICK_NS
@@ -40,16 +42,17 @@ class LineController:
     captures = None
 
     def __init__(self, rig: RigFile, truth: Truth, faults: Sequence[Fault] = (), substeps: int = 2) -> None:
-        if faults:
-            raise ConfigError(f"--inject {faults[0].kind}: the controller of rig {rig.name} knows no such fault")
+        if other := [str(f) for f in faults if f.kind not in KINDS]:
+            raise ConfigError(
+                f"--fault {', '.join(other)}: a line knows no such fault; expected one of {', '.join(KINDS)}"
+            )
         self.truth = truth
         self.plant: Any
         self.plant = truth.machine.make(truth.plant, truth.noise, substeps)
         self.device = Device(self.plant)
         url = linkurl.parse(rig.link.url)
-        self.uart = Uart(
-            self.device, int(url.query["baudrate"]) if url.query.get("baudrate", "").isdigit() else 3_000_000
-        )
+        baud = int(url.query["baudrate"]) if url.query.get("baudrate", "").isdigit() else FASTEST
+        self.uart = Uart(self.device, baud, LineFaults(faults, truth.noise) if faults else None)
 
     @property
     def state(self) -> str:

@@ -4,19 +4,20 @@ positions or more; a request acts between two."""
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Final
 
 from sim_backend.core.plant import Array
 from sim_backend.machines.lira.captures import Captures
 from sim_backend.machines.lira.plant import DQ, FAULTS, POSITION_TICKS, STATES, TICKS_S, WHOLE, Plant
 from sim_backend.machines.lira.settings import AXES_OF_LINE, BY_NAME, MEASUREMENTS, SETTINGS
-from sim_backend.machines.lira.shell import Refused, Shell, number, single
+from sim_backend.machines.lira.shell import PROMPT, Refused, Shell, number, single
 from sim_backend.machines.lira.streamed import Streamed
 
 RATES: Final = (115_200, 921_600, 3_000_000)
 RESTING: Final = ("OFF", "IDLE")
 AT_ONCE: Final = ("lift", "land", "stop", "clear", "safe")
+BANNER: Final = "lira firmware 1.0"
 SWITCHES: Final = ("echo", "prompt", "checksum", "event")
 SWITCHED: Final = {"checksum": "checksums", "event": "events"}
 COLUMNS: Final = {m.name: (m, WHOLE.index(m.column)) for m in MEASUREMENTS}
@@ -35,6 +36,7 @@ class Device:
         self.shell = Shell(self)
         self.baud = RATES[0]
         self._serial = serial
+        self._started, self._beat = 0, ""
         self._rows: Array = plant.run(1 / 35000, whole=True)
         self._told = (plant.state, plant.fault)
         self._captures = Captures()
@@ -42,17 +44,24 @@ class Device:
         """Slow telemetry: blocks that wait to be sent."""
         self._verbs: dict[str, Callable[..., Iterable[str | bytes]]] = {
             "id": self._id, "stat": self._stat, "meas": self._meas, "list": self._list, "get": self._get, "set": self._set,
-            "default": self._default, "on": self._on, "ref": self._ref, "halt": self._halt, "step": self._step,
-            "inj": self._inj, "hb": self._hb, "stream": self.streamed.do, "baud": self._baud, "cap": self._captures.do,
+            "default": self._default, "save": self._save, "on": self._on, "ref": self._ref, "halt": self._halt,
+            "step": self._step, "inj": self._inj, "hb": self._hb, "stream": self.streamed.do, "baud": self._baud,
+            "cap": self._captures.do,
         }  # fmt: skip
         self._verbs |= {name: self._switch(name) for name in SWITCHES}
         self._verbs |= {name: self._command(name) for name in AT_ONCE}
         self._factory = {s.name: float(plant.get(s.field)) for s in SETTINGS}
+        self._saved = dict(self._factory)
 
     @property
     def tick(self) -> int:
-        """Ticks of 1/280 000 s since the start."""
-        return self.plant.tick
+        """Ticks of 1/280 000 s since the firmware started."""
+        return self.plant.tick - self._started
+
+    @property
+    def verbs(self) -> tuple[str, ...]:
+        """What it can be asked."""
+        return tuple(self._verbs)
 
     def advance(self, seconds: float) -> bytes:
         """Let time pass; the events of it."""
@@ -60,7 +69,7 @@ class Device:
         while left > 0:
             ticks = min(left, TICKS_S // 1000)
             capture = self._captures.running
-            at = self.plant.tick
+            at = self.tick
             every = capture.every if capture else POSITION_TICKS
             self._rows = self.plant.run(ticks / TICKS_S, every, whole=True)
             self.streamed.take(self._rows, at, every, self.plant.heard_s)
@@ -71,6 +80,23 @@ class Device:
             self._watch()
             left -= ticks
         return self.shell.told()
+
+    def restart(self, why: str) -> bytes:
+        """As after power-on: OFF, with the settings that were saved, nothing captured, nothing streamed, a person's line. The
+        machine goes on as it is, without currents; what the firmware says."""
+        self.plant.power_on()
+        self._started = self.plant.tick
+        self._put(self._saved)
+        later, self.shell = self.shell.later, Shell(self)
+        self.shell.later = later
+        if later is not None:
+            later.clear()
+        self.baud = RATES[0]
+        self._captures.forget()
+        self.streamed.end()
+        self._told = (self.plant.state, self.plant.fault)
+        self.shell.tell(0, "boot", why)
+        return f"{BANNER}\r\n".encode("ascii") + self.shell.told() + PROMPT.encode("ascii")
 
     def do(self, words: tuple[str, ...]) -> Iterable[str | bytes]:
         """Carry out a request.
@@ -162,8 +188,17 @@ class Device:
 
     def _default(self) -> Iterable[str]:
         self._resting()
+        self._put(self._factory)
+        return []
+
+    def _put(self, values: Mapping[str, float]) -> None:
         for s in SETTINGS:
-            self.plant.set(s.field, self._factory[s.name])
+            self.plant.set(s.field, values[s.name])
+
+    def _save(self) -> Iterable[str]:
+        """What is set now is set at the next start, too."""
+        self._resting()
+        self._saved = {s.name: self.plant.get(s.field) for s in SETTINGS}
         return []
 
     def _resting(self) -> None:
@@ -228,7 +263,9 @@ class Device:
     def _hb(self, *words: str) -> Iterable[str]:
         if len(words) != 1 or not words[0].isdigit():
             raise Refused(2, "counter")
-        self.plant.beat()
+        if words[0] != self._beat:  # one that stands still says nothing of its host
+            self.plant.beat()
+        self._beat = words[0]
         return [words[0]]
 
     def _baud(self, *words: str) -> Iterable[str]:

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
+from bench.errors import ConfigError
 from bench.rigfile import RigFile
 from bench.rigfile.toleranced import Toleranced
 from sim_backend.machine import Array, Machine, Numbers, Truth
@@ -43,6 +44,18 @@ the firmware takes the zero of the first rotary actuator for both; `adc_late_s`:
 the observers do not know the negative stiffness; `position_sign_*`: of a probe; `factor_*`: what the firmware has of
 a gain or a limit that it was told; `capacitance_factor`: of every capacitor, beside what it was drawn with."""
 FACTORS: Final = ("kp_s", "kp_sl", "kp_v", "current_max")
+ELECTRICAL: Final = (
+    "coil_reversed",
+    "exchange_phases",
+    "exchange_actuators",
+    "adc_late_s",
+    "factor_kp_s",
+    "factor_kp_sl",
+    "factor_kp_v",
+    "factor_current_max",
+    "capacitance_factor",
+)
+"""What the reduced model knows nothing of."""
 DAILY = frozenset(("site.air_density", "rest_angle"))
 """The weather, and how the mover was left."""
 TARGETS = {
@@ -87,7 +100,14 @@ def _names(stated_as: str) -> Iterator[str]:
 
 
 def params(v: Numbers, d: Numbers) -> Built:
-    """What drawn values `v` and planted defects `d` make."""
+    """What drawn values `v` and planted defects `d` make.
+
+    Raises:
+        ConfigError: a defect is planted that the reduced model, which is asked for, does not have.
+    """
+    if v["reduced"] and (unseen := [name for name in ELECTRICAL if d[name] != DEFECTS[name]]):
+        raise ConfigError(f"simulation.reduced: found 1 with {', '.join(unseen)}; expected 0: the reduced model has no "
+                          "half-bridges")  # fmt: skip
     plant = PlantParams(
         **_moved(v), **_aligned(v, d), **_wound(v, d), **_sensed(v, d), **_wired(d),
         filter_r=v["filter_resistance"], supply=v["supply"], clearance=v["geometry.clearance"],

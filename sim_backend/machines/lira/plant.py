@@ -19,7 +19,7 @@ AXES: Final = ("x1", "x2", "y1", "y2", "z", "angle")
 SYSTEMS: Final = ("R1", "B1", "R2", "B2", "L")
 STATES: Final = ("OFF", "IDLE", "CURRENT", "LIFT", "LEVITATED", "LANDING", "FAULT")
 COMMANDS: Final = ("idle", "on", "lift", "land", "stop", "clear", "safe")
-FAULTS: Final = ("NONE", "LEVITATION_LOST", "OVERCURRENT", "SUPPLY")
+FAULTS: Final = ("NONE", "LEVITATION_LOST", "OVERCURRENT", "SUPPLY", "HEARTBEAT_LOST")
 DQ: Final = tuple(f"{way}_{name}" for name in SYSTEMS for way in "dq")
 PHASES: Final = range(1, 16)
 MEASURED: Final = (
@@ -97,6 +97,15 @@ class Plant:
     def command(self, name: str) -> int:
         """Give the firmware a command: 0 done, 1 not in this state, 2 the mover stands too far off the middle to be lifted."""
         return int(_lib.lira_command(self._p, self._c, self._s, COMMANDS.index(name)))
+
+    def power_on(self) -> None:
+        """The firmware starts anew: OFF, without a fault, nothing added to a reference."""
+        if self.command("clear"):
+            self.command("stop")
+        self._s.mode = STATES.index("OFF")
+        self._c.inject_axis = -1.0
+        for k in range(len(DQ)):
+            self._s.manual[k] = 0.0
 
     def beat(self) -> None:
         """A heartbeat of the host."""

@@ -47,6 +47,11 @@ class Streamed:
         self._ticks = TICKS_S // hz if hz else 0
         return [words[0]]
 
+    def end(self) -> None:
+        """Nothing more is told."""
+        self.waiting.clear()
+        self._ticks = self._count = 0
+
     def take(self, rows: Array, tick: int, every: int, heard_s: float) -> None:
         """Rows (n, len(WHOLE)) of the machine, of every so many ticks from a tick on."""
         for k in self._due(tick, every, len(rows)):

@@ -7,6 +7,7 @@ from collections import deque
 from typing import Final
 
 from sim_backend.machines.lira.device import Device
+from sim_backend.machines.lira.linefaults import LineFaults
 
 BITS: Final = 10
 """Of a byte on the line: start, eight, stop."""
@@ -20,10 +21,12 @@ class Uart:
     Args:
         device: with its command line.
         baud: of the line, whatever the device says; 0: that of the device.
+        faults: of the line.
     """
 
-    def __init__(self, device: Device, baud: int = 0) -> None:
-        self.device, self._baud = device, baud
+    def __init__(self, device: Device, baud: int = 0, faults: LineFaults | None = None) -> None:
+        self.device, self._baud, self._faults = device, baud, faults
+        self._now_s = self._silent_until = 0.0
         device.shell.later = deque()
         self._first: deque[bytes] = deque()
         self._blocks: deque[bytes] = deque()
@@ -31,6 +34,9 @@ class Uart:
 
     def advance(self, seconds: float, data: bytes) -> bytes:
         """Take bytes, let time pass; what has gone out by its end."""
+        if self._faults is not None:
+            data = self._disturbed(self._faults, data)
+        self._now_s += seconds
         shell = self.device.shell
         if data:
             self._say(shell.feed(data))
@@ -49,10 +55,22 @@ class Uart:
             self._first.append(data)
 
     def _gone(self, seconds: float) -> bytes:
+        if self._now_s <= self._silent_until:
+            return b""
         self._room = min(self._room, 0.0) + (self._baud or self.device.baud) / BITS * seconds
         out = []
         for queue in (self._first, self._blocks):
             while queue and self._room > 0:
                 out.append(queue.popleft())
                 self._room -= len(out[-1])
-        return b"".join(out)
+        return b"".join(out) if self._faults is None else self._faults.said(out, self._now_s)
+
+    def _disturbed(self, faults: LineFaults, data: bytes) -> bytes:
+        """What the firmware hears; while it restarts, nothing."""
+        data = faults.heard(data, self._now_s)
+        if silent := faults.restart(self._now_s):
+            self._first.clear()
+            self._blocks.clear()
+            self._say(self.device.restart("power"))
+            self._silent_until = self._now_s + silent
+        return data if self._now_s >= self._silent_until else b""
