@@ -80,7 +80,9 @@ class Built:
 
 def stated(rig: RigFile) -> dict[str, Toleranced]:
     """Every toleranced number of a rig file that is drawn, by its name; one that holds for each coil once for each."""
-    out = {f"geometry.{k}": t for k, t in rig.geometry.items()} | {f"machine.{k}": t for k, t in rig.machine.items()}
+    out = {f"geometry.{k}": t for k, t in rig.geometry.items()} | {
+        f"machine.{k}": t for k, t in rig.machine.items() if k not in EACH
+    }
     out |= {"site.gravity": rig.site.gravity, "site.air_density": rig.site.air_density}
     for name, sensor in rig.sensors.items():
         out |= {f"{name}.gain": sensor.gain, f"{name}.offset": sensor.offset}
