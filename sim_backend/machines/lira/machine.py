@@ -120,8 +120,7 @@ def params(v: Numbers, d: Numbers) -> Built:
         filter_r=v["filter_resistance"], supply=v["supply"], clearance=v["geometry.clearance"],
         ring_friction=v["ring_friction"],
     )  # fmt: skip
-    known = ControlParams(observer_pull=0.0 if d["no_pull"] else 1.0, one_zero=d["one_zero"])
-    control = replace(known, supply_V=v.get("firmware_supply", known.supply_V))
+    control = ControlParams(observer_pull=0.0 if d["no_pull"] else 1.0, one_zero=d["one_zero"])
     factors = {name: d[f"factor_{name}"] for name in FACTORS if d[f"factor_{name}"] != 1}
     return Built(plant, control, v["reduced"] != 0, v["rest_angle"], factors)
 
