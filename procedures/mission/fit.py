@@ -43,7 +43,7 @@ def swing(x: Array) -> float:
 
 def smoothed(x: Array, width: float) -> Array:
     """`x` (n,) under a Gauss window of so many samples' standard deviation."""
-    from scipy.ndimage import gaussian_filter1d  # slow to import, and a check before a run needs none
+    from scipy.ndimage import gaussian_filter1d  # slow to import, and wanted by evaluation alone
 
     out: Array = gaussian_filter1d(np.asarray(x, np.float64), width, mode="reflect")
     return out

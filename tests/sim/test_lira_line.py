@@ -1,4 +1,4 @@
-"""The command line's troubles, and what becomes of them: harmless ones cost a repeat and nothing else, none passes in silence."""
+"""The command line's troubles, and what becomes of them: harmless ones cost a repeat, none passes in silence."""
 
 from __future__ import annotations
 
