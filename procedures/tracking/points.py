@@ -27,6 +27,7 @@ FINE = 2000  # points of the ellipse that are looked at
 LARGE = 0.5  # of the greatest step: those whose answers are looked at
 RESTS = 4  # samples before a step that it is counted from
 REACH_S = 6e-3  # after a step
+READ_PERIODS = 4  # of the telemetry that the answer is looked at
 READ_S = 2e-3  # the same of single readings: those of many steps lie close together, and the rate soon turns the answer round
 
 
@@ -82,10 +83,8 @@ def delay(
     if not at:
         raise AnalysisError("found no samples about the steps of the reference; expected some about each")
     when, what = np.concatenate(at), np.concatenate(answers)
-    window = READ_S if ticks == 1 else None
-    return onset(
-        when, what, 0.0, 2 * period, tick=tick, ticks=ticks, lag_s=machine.lag_s, window_s=window, period_s=period_s
-    )
+    window = READ_S if ticks == 1 else READ_PERIODS * max(ticks * tick, period_s)
+    return onset(when, what, None, 0.0, 2 * period, tick=tick, ticks=ticks, lag_s=machine.lag_s, window_s=window)
 
 
 def contour(y: Array, z: Array, half_y: float, half_z: float) -> Array:
