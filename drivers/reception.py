@@ -6,15 +6,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any, Protocol
 
 import can
 
 from bench.errors import ConfigError, LinkError
 from bench.link import LinkStats
+from bench.link.commandstream import CommandStream
 from bench.link.frames import FrameBatch
 from bench.link.packetstream import PacketStream
-from bench.rigfile import LinkSpec, linkurl
+from bench.rigfile import LinkSpec, RigFile, linkurl
 from drivers.byteport import BytePort
 from drivers.canbus import CanBus, arguments_of, open_interface
 from drivers.slcan_reception import SlcanReception
@@ -94,6 +96,35 @@ class PacketReception:
         self._port.close()
 
 
+class LineReception:
+    """A command line that is only read: slow telemetry, where somebody has asked for it. Nothing is asked for."""
+
+    complaint = ""
+
+    def __init__(self, port: MutePort, rig: RigFile, now_ns: Callable[[], int]) -> None:
+        self.manner = "the port is read, nothing is written to it; a controller that streams nothing is silent"
+        self._port, self._now_ns = port, now_ns
+        self._stream = CommandStream(rig)
+        self.stats = LinkStats()
+
+    def read(self, timeout_s: float) -> FrameBatch:
+        """As Reception says."""
+        data = self._port.read(timeout_s)
+        batch = self._stream.feed(data, self._now_ns())
+        self.stats.received += len(batch)
+        self.stats.octets += len(data)
+        self.stats.malformed, self.stats.crc_errors = self._stream.counts.dropped, self._stream.counts.damaged
+        return batch
+
+    def cancel(self) -> None:
+        """As Reception says."""
+        self._port.cancel()
+
+    def close(self) -> None:
+        """As Reception says."""
+        self._port.close()
+
+
 class CanReception:
     """An interface of python-can whose sending is taken away."""
 
@@ -124,13 +155,16 @@ def _refuse(*_: Any, **__: Any) -> None:
     raise can.CanOperationError("the interface is open for listening; nothing is sent on it")
 
 
-def open_reception(spec: LinkSpec, name: str, now_ns: Callable[[], int], *, acknowledge: bool = False) -> Reception:
+def open_reception(
+    spec: LinkSpec, name: str, now_ns: Callable[[], int], *, acknowledge: bool = False, rig: RigFile | None = None
+) -> Reception:
     """Open the transport of a controller's link for listening.
 
     Args:
         spec: of the link, from the rig file.
         name: of the link.
         now_ns: host clock, UNIX ns; it stamps frames.
+        rig: whose table `commandline` says what a command line's blocks are.
         acknowledge: a CAN adapter acknowledges frames, as on a bus where nobody else does; it still sends none.
 
     Raises:
@@ -147,9 +181,13 @@ def open_reception(spec: LinkSpec, name: str, now_ns: Callable[[], int], *, ackn
         return _open_can(arguments_of(spec, name), name, now_ns, acknowledge)
     if url.scheme == "serial":
         return PacketReception(open_port(name, url, MutePort), now_ns)
+    if url.scheme == "cli" and rig is not None:
+        return LineReception(
+            open_port(name, replace(url, rest=url.rest.removeprefix("serial:")), MutePort), rig, now_ns
+        )
     raise ConfigError(
-        f"link {name}: found {spec.url!r}, where nothing can be listened to; expected a URL that starts with slcan:, can: or "
-        f"serial:. Next: --link {name}=URL with one that `bench serve` prints, or that of the adapter"
+        f"link {name}: found {spec.url!r}, where nothing can be listened to; expected a URL that starts with slcan:, can:, "
+        f"serial: or cli:. Next: --link {name}=URL with one that `bench serve` prints, or that of the adapter"
     )
 
 

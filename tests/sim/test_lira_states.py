@@ -89,7 +89,7 @@ def test_a_silent_host_is_landed_within_the_watchdog() -> None:
     rows = plant.run(0.2)
     assert np.argmax(rows[:, MODE] == STATES.index("LANDING")) / 35e3 == pytest.approx(0.08, abs=1e-3)
     plant.run(2.0)
-    assert plant.state == "IDLE"
+    assert (plant.state, plant.fault) == ("FAULT", "HEARTBEAT_LOST")
 
 
 def test_what_is_lost_trips_within_a_millisecond_and_is_cleared_by_a_command() -> None:

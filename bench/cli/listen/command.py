@@ -141,7 +141,7 @@ def _opened(rig: RigFile, request: ListenRequest, clock: WallClock, stack: ExitS
 
     name = rig.devices["controller"].link
     sys.stderr.write(f"listening to {rig.name} on {name}, {rig.link.url}: nothing is sent; Ctrl-C ends\n")
-    reception = open_reception(rig.link, name, clock.now_ns, acknowledge=request.acknowledge)
+    reception = open_reception(rig.link, name, clock.now_ns, acknowledge=request.acknowledge, rig=rig)
     listener = Listener(name, reception)
     stack.callback(listener.close)
     ear = Ear(name, rig.link.url, listener.manner, clock.now_ns(), listener.complaint)

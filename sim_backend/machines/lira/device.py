@@ -44,8 +44,9 @@ class Device:
         """Slow telemetry: blocks that wait to be sent."""
         self._verbs: dict[str, Callable[..., Iterable[str | bytes]]] = {
             "id": self._id, "stat": self._stat, "meas": self._meas, "list": self._list, "get": self._get, "set": self._set,
-            "default": self._default, "save": self._save, "on": self._on, "ref": self._ref, "halt": self._halt, "step": self._step,
-            "inj": self._inj, "hb": self._hb, "stream": self.streamed.do, "baud": self._baud, "cap": self._captures.do,
+            "default": self._default, "save": self._save, "on": self._on, "ref": self._ref, "halt": self._halt,
+            "step": self._step, "inj": self._inj, "hb": self._hb, "stream": self.streamed.do, "baud": self._baud,
+            "cap": self._captures.do,
         }  # fmt: skip
         self._verbs |= {name: self._switch(name) for name in SWITCHES}
         self._verbs |= {name: self._command(name) for name in AT_ONCE}

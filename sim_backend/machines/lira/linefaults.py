@@ -1,7 +1,7 @@
-"""Faults of a serial line, on purpose: what becomes of lines and blocks on their way out, and of what the host says.
+"""Faults of a serial line, on purpose: what becomes of lines and blocks on their way, and of what the host says.
 
-Of what goes out `drop` loses a unit (a line or a block) or one of its bytes, `duplicate` doubles it, `reorder` lets the next one
-go first, `corrupt` flips a bit of it or puts bytes before it that nobody sent. `mute` leaves the host without answers,
+Of what goes out `drop` loses a unit (a line or a block) or one of its bytes, `duplicate` doubles it, `reorder` lets the next
+one go first, `corrupt` flips a bit of it or puts bytes before it that nobody sent. `mute` leaves the host without answers,
 `stuck-heartbeat` lets no heartbeat count, `reboot` restarts the firmware."""
 
 from __future__ import annotations

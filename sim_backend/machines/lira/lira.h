@@ -83,7 +83,7 @@ void lira_coils(const double *dq, double cos_phase, double sin_phase, double *co
 #define STEP_S (LIRA_TICK * POSITION_TICKS)
 enum { LIRA_OFF, LIRA_IDLE, LIRA_CURRENT, LIRA_LIFT, LIRA_LEVITATED, LIRA_LANDING, LIRA_FAULT };
 enum { DO_IDLE, DO_ON, DO_LIFT, DO_LAND, DO_STOP, DO_CLEAR, DO_SAFE };
-enum { FAULT_NONE, FAULT_LOST, FAULT_CURRENT, FAULT_SUPPLY };
+enum { FAULT_NONE, FAULT_LOST, FAULT_CURRENT, FAULT_SUPPLY, FAULT_HOST };
 enum { X1, X2, Y1, Y2, Z, ANGLE };
 
 typedef struct {

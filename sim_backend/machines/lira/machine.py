@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
+from bench.errors import ConfigError
 from bench.rigfile import RigFile
 from bench.rigfile.toleranced import Toleranced
 from sim_backend.machine import Array, Machine, Numbers, Truth
@@ -38,6 +39,8 @@ DEFECTS = {
 half-bridges of one drive the other; `zero_off_*` rad electrical: encoder turned or moved after its zero was set; `one_zero`: 1,
 the firmware takes the zero of the first rotary actuator for both; `adc_late_s`: of the half-bridges' readings; `no_pull`: 1,
 the observers do not know the negative stiffness; `position_sign_*`: of a probe."""
+ELECTRICAL: Final = ("coil_reversed", "exchange_phases", "exchange_actuators", "adc_late_s")
+"""What the reduced model knows nothing of."""
 DAILY = frozenset(("site.air_density", "rest_angle"))
 """The weather, and how the mover was left."""
 TARGETS = {
@@ -81,7 +84,14 @@ def _names(stated_as: str) -> Iterator[str]:
 
 
 def params(v: Numbers, d: Numbers) -> Built:
-    """What drawn values `v` and planted defects `d` make."""
+    """What drawn values `v` and planted defects `d` make.
+
+    Raises:
+        ConfigError: a defect is planted that the reduced model, which is asked for, does not have.
+    """
+    if v["reduced"] and (unseen := [name for name in ELECTRICAL if d[name]]):
+        raise ConfigError(f"simulation.reduced: found 1 with {', '.join(unseen)}; expected 0: the reduced model has no "
+                          "half-bridges")  # fmt: skip
     plant = PlantParams(
         **_moved(v), **_aligned(v, d), **_wound(v), **_sensed(v, d), **_wired(d),
         filter_r=v["filter_resistance"], supply=v["supply"], clearance=v["geometry.clearance"],

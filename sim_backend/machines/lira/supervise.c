@@ -1,6 +1,6 @@
 /* States of the firmware, at every reading of the positions: OFF, IDLE (no PWM), CURRENT (current loops, angle and z; in the
  * touchdown rings), LIFT (bearings on, out of the rings, gate running), LEVITATED, LANDING (down, bearings off in the rings, on to
- * z = 0; there into CURRENT, or where nobody listens or it was made safe into IDLE), FAULT. L's VI-B: the gate wants all four radial readings within +-20 um for 250 ms; landing at 10 mm/s, off at 2.7 mm. */
+ * z = 0; there into CURRENT, into IDLE where it was made safe, into FAULT where nobody listens), FAULT. L's VI-B: the gate wants all four radial readings within +-20 um for 250 ms; landing at 10 mm/s, off at 2.7 mm. */
 #include <math.h>
 #include <string.h>
 #include "winding.h"
@@ -115,7 +115,16 @@ static void set_down(const lira_control *c, lira_state *st) {
     st->gate_clock = !st->bearings_on && st->ref[Z] == st->target[Z] ? st->gate_clock + 1 : 0;
     if (st->gate_clock * STEP_S < c->rest_s) return;
     st->mode = LIRA_CURRENT;
-    if (st->off_after) off(st, LIRA_IDLE);
+    if (st->off_after) off(st, st->fault == FAULT_HOST ? LIRA_FAULT : LIRA_IDLE);
+}
+
+/* nobody listens: what is held is set down, the fault stays */
+static void host_lost(const lira_control *c, lira_state *st) {
+    st->fault = FAULT_HOST;
+    if (st->mode == LIRA_CURRENT) off(st, LIRA_FAULT);
+    else if (st->mode == LIRA_LANDING) st->off_after = 1;
+    else land(c, st, 1);
+    st->heard = -1;
 }
 
 static void watch(const lira_params *p, const lira_control *c, lira_state *st) {
@@ -126,9 +135,7 @@ static void watch(const lira_params *p, const lira_control *c, lira_state *st) {
     for (int k = 0; k < BRIDGES; k++)
         if (fabs(st->coil[k]) > c->trip_A) trip(st, FAULT_CURRENT);
     int silent = st->heard >= 0 && (st->tick - st->heard) * LIRA_TICK > c->watchdog_s;
-    if (silent && (st->mode == LIRA_LIFT || st->mode == LIRA_LEVITATED)) land(c, st, 1);
-    if (silent && st->mode == LIRA_LANDING) st->off_after = 1;
-    if (silent && st->mode == LIRA_CURRENT) off(st, LIRA_IDLE);
+    if (silent) host_lost(c, st);
 }
 
 void lira_supervise(const lira_params *p, const lira_control *c, lira_state *st) {

@@ -55,14 +55,14 @@ class Uart:
             self._first.append(data)
 
     def _gone(self, seconds: float) -> bytes:
+        if self._now_s <= self._silent_until:
+            return b""
         self._room = min(self._room, 0.0) + (self._baud or self.device.baud) / BITS * seconds
         out = []
         for queue in (self._first, self._blocks):
             while queue and self._room > 0:
                 out.append(queue.popleft())
                 self._room -= len(out[-1])
-        if self._now_s <= self._silent_until:
-            return b""
         return b"".join(out) if self._faults is None else self._faults.said(out, self._now_s)
 
     def _disturbed(self, faults: LineFaults, data: bytes) -> bytes:
