@@ -17,7 +17,7 @@ static struct {
     int fresh; /* no last value yet */
     uint32_t crc;
 } c;
-static struct { int open, tag, summed; uint32_t offset, end, sent; } reading;
+static struct { int open, tag, summed; uint32_t offset, end, blocks; } reading;
 static unsigned stream_every;
 static uint16_t sequence;
 
@@ -63,7 +63,7 @@ static void telemetry(void)
     for (int k = 0; k < 6; k++) at = put(at, counts(channel_value(46 + k), scale[k]), 2);
     for (int k = 0; k < CURRENTS; k++) at = put(at, counts(channel_value(52 + k), 1e-3), 2);
     at = put(at, (uint32_t)(channel_value(45) * 100 + 0.5), 2);
-    at = put(put(put(at, state, 1), 0, 1), 0, 2);
+    at = put(put(put(at, state, 1), (uint32_t)fault, 1), 0, 2);
     at = put(at, counts(speed(), 0.005), 2);
     uint64_t age = heartbeat_age() * 1000 / TICKS;
     put(at, age > 65535 ? 65535 : (uint32_t)age, 2);
@@ -104,10 +104,10 @@ void capture_tick(void)
         double value = channel_value((int)c.list[k]);
         at = put(at, counts(value, channels[c.list[k]].scale), 2);
         if (c.state != ARMED || c.trigger != LEVEL || (int)c.list[k] != c.source) continue;
-        if (!c.fresh && c.last < c.level && value >= c.level && c.total >= c.before) triggered(c.total);
+        if (!c.fresh && c.last < c.level && value >= c.level) triggered(c.total);
         c.last = value, c.fresh = 0;
     }
-    if (c.state == ARMED && c.trigger == NOW && c.total >= c.before) triggered(c.total);
+    if (c.state == ARMED && c.trigger == NOW) triggered(c.total);
     c.total++;
     if (c.state == RUNNING && c.total - c.start == c.length) done();
 }
@@ -124,7 +124,6 @@ static void arm(int words, char **word)
 {
     char *end = NULL;
     double rate, length, before;
-    if (c.state == ARMED || c.state == RUNNING) { fail(BUSY, "capture %u", c.number); return; }
     if (words < 5) { fail(ARGUMENTS, "MASK RATE LENGTH BEFORE now|step|level"); return; }
     c.mask = strtoull(word[0], &end, 16);
     int fine = !*end && number_of(word[1], &rate) && number_of(word[2], &length) && number_of(word[3], &before);
@@ -141,7 +140,7 @@ static void arm(int words, char **word)
     }
     c.length = (uint64_t)length, c.before = (uint64_t)before, c.width = 2 * n;
     c.total = c.start = c.at = 0, c.fresh = 1, c.state = ARMED;
-    c.number = c.number % 0xFFF0 + 1;
+    c.number = c.number % 0xFFFD + 1;
     reading.open = 0;
     ok("%u bytes=%llu", c.number, (unsigned long long)bytes());
 }
@@ -152,16 +151,16 @@ static void status(void)
     char sum[32] = "";
     if (c.state == NONE) { fail(NO_CAPTURE, ""); return; }
     if (c.state == DONE) snprintf(sum, sizeof sum, " %s=%u", word_of("crc"), (unsigned)c.crc);
-    ok("%u %s %s=%llu %s=%llu %s=%llu %s=%llu %s=%u channels=%llx%s", c.number, word_of(names[c.state]), word_of("bytes"),
+    ok("%u %s %s=%llu %s=%llu %s=%llu %s=%llu %s=%u channels=%u%s", c.number, word_of(names[c.state]), word_of("bytes"),
        (unsigned long long)bytes(), word_of("samples"), (unsigned long long)(c.state == ARMED ? 0 : c.total - c.start),
        word_of("trigger"), (unsigned long long)c.at, word_of("tick"), (unsigned long long)(c.first_tick + c.start * c.every),
-       word_of("every"), c.every, (unsigned long long)c.mask, sum);
+       word_of("every"), c.every, c.width / 2, sum);
 }
 
 static void sent(void)
 {
     char text[40];
-    snprintf(text, sizeof text, "cap sent=%u", (unsigned)reading.sent);
+    snprintf(text, sizeof text, "cap sent=%u", (unsigned)reading.blocks);
     reading.open = 0;
     answer_later(reading.tag, reading.summed, text);
 }
@@ -169,12 +168,13 @@ static void sent(void)
 void capture_send(void)
 {
     uint8_t piece[1024];
+    if (reading.open && reading.offset >= reading.end) sent();
     while (reading.open && out_room() > 512u * 1024) {
         unsigned n = reading.end - reading.offset < 1024 ? reading.end - reading.offset : 1024;
         uint64_t head = c.start % c.length * c.width;
         for (unsigned k = 0; k < n; k++) piece[k] = memory[(head + reading.offset + k) % bytes()];
         send_block(c.number, reading.offset, piece, n);
-        reading.offset += n, reading.sent += n;
+        reading.offset += n, reading.blocks++;
         if (reading.offset == reading.end) sent();
     }
 }
@@ -194,10 +194,9 @@ void verb_cap(int words, char **word)
         fail(ARGUMENTS, "arm|stat|read|cancel");
     else if (c.state == NONE) fail(NO_CAPTURE, "");
     else if (c.state != DONE) fail(STATE, "%s", word_of(names[c.state]));
-    else if (offset < 0 || length < 1 || offset + length > (double)bytes()) fail(RANGE, "0..%llu", (unsigned long long)bytes());
+    else if (offset < 0 || length < 0) fail(ARGUMENTS, "OFFSET LENGTH");
     else {
-        if (reading.open) sent();
-        reading.offset = (uint32_t)offset, reading.end = (uint32_t)(offset + length), reading.sent = 0;
+        reading.offset = (uint32_t)offset, reading.end = (uint32_t)fmin(offset + length, (double)bytes()), reading.blocks = 0;
         reading.tag = current_tag(), reading.summed = current_summed(), reading.open = 1;
     }
 }

@@ -17,9 +17,10 @@ enum { UNKNOWN_VERB = 1, ARGUMENTS, RANGE, STATE, BUSY, CHECKSUM, TOO_LONG, NOT_
 struct move { double now, goal, rate; };
 extern uint64_t tick;
 extern enum state state;
+extern int fault; /* as telemetry has it: 0 none, 4 HEARTBEAT_LOST */
 extern double step_of[CURRENTS];  /* A, added to each current's reference */
 extern struct move moves[6];      /* x1 x2 y1 y2 z gamma: m, rad */
-extern const char *const state_names[7], *const axis_names[6];
+extern const char *const state_names[7], *const axis_names[6], *const fault_names[5];
 void plant_start(void);
 void plant_to(uint64_t target);
 double channel_value(int channel); /* SI, with noise */

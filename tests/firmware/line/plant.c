@@ -7,6 +7,7 @@
 #define ZETA 0.6
 #define NOISE 5e-3     /* A, standard deviation */
 #define TIMED (3 * TICKS / 10) /* a lift and a landing */
+#define HEARTBEAT_LOST 4
 #define WATCHDOG (TICKS * 80 / 1000)
 #define LIFTED 8e-3 /* m */
 #define RESTING -25e-6
@@ -14,7 +15,9 @@
 
 const char *const state_names[7] = {"OFF", "IDLE", "CURRENT", "LIFT", "LEVITATED", "LANDING", "FAULT"};
 const char *const axis_names[6] = {"x1", "x2", "y1", "y2", "z", "gamma"};
+const char *const fault_names[5] = {"NONE", "LEVITATION_LOST", "OVERCURRENT", "SUPPLY", "HEARTBEAT_LOST"};
 uint64_t tick;
+int fault;
 enum state state = OFF;
 double step_of[CURRENTS];
 struct move moves[6];
@@ -49,7 +52,6 @@ static double noise(void)
 void go(enum state next)
 {
     if (next != state) event("state %s", state_names[next]);
-    if (next < CURRENT) for (int k = 0; k < CURRENTS; k++) step_of[k] = 0;
     if (next == CURRENT && state < CURRENT) heartbeat = tick;
     if (next == LIFT) moves[4].goal = LIFTED;
     state = next;
@@ -60,7 +62,6 @@ void go(enum state next)
 void land(enum state then)
 {
     after = then;
-    for (int k = 0; k < CURRENTS; k++) step_of[k] = 0;
     if (state != LANDING) go(LANDING);
 }
 
@@ -81,14 +82,16 @@ void heard_heartbeat(unsigned now)
     counter = now;
 }
 
-uint64_t heartbeat_age(void) { return tick - heartbeat; }
+uint64_t heartbeat_age(void) { return state < CURRENT || state == FAULT ? UINT64_MAX / 1000 : tick - heartbeat; }
 
 static void watch(void)
 {
-    if (state < CURRENT || state == FAULT || state == LANDING || heartbeat_age() < WATCHDOG) return;
-    tell("heartbeat %llu landing %llu in %s", (unsigned long long)heartbeat, (unsigned long long)tick, state_names[state]);
-    if (state == CURRENT) go(IDLE);
-    else land(IDLE);
+    if (state < CURRENT || state == FAULT || fault || heartbeat_age() < WATCHDOG) return;
+    fault = HEARTBEAT_LOST;
+    tell("heartbeat %llu lost %llu %s", (unsigned long long)heartbeat, (unsigned long long)tick, state_names[state]);
+    event("fault %s", fault_names[fault]);
+    if (state == CURRENT) go(FAULT);
+    else land(FAULT);
 }
 
 static void position(void)
@@ -103,7 +106,10 @@ static void position(void)
         m->now += fmax(-most, fmin(most, left));
     }
     if (state == LIFT && tick - since >= TIMED) go(LEVITATED);
-    else if (state == LANDING && tick - since >= TIMED) go(after);
+    else if (state == LANDING && tick - since >= TIMED) {
+        go(after);
+        if (state > CURRENT) tell("landed %llu %s", (unsigned long long)tick, state_names[state]);
+    }
 }
 
 void plant_to(uint64_t target)
@@ -111,7 +117,7 @@ void plant_to(uint64_t target)
     while (tick < target) {
         tick++;
         for (int k = 0; k < CURRENTS; k++) {
-            double reference = state < CURRENT ? 0 : step_of[k] + (state == LIFT || state == LEVITATED ? carrying[k] : 0);
+            double reference = state < CURRENT || state == FAULT ? 0 : step_of[k] + (state == LIFT || state == LEVITATED ? carrying[k] : 0);
             double y = current[k].value - reference, v = current[k].rate;
             current[k].value = reference + yy * y + yv * v;
             current[k].rate = vy * y + vv * v;

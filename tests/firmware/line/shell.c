@@ -194,6 +194,7 @@ static void end_of_line(void)
     performing = 1;
     keeping = tag >= 0 && sum >= 0 && !over;
     if (keeping) kept = 0, later = 1, strcpy(kept_request, request);
+    if (over || sum < 0) tag = -1, summed = 0; /* which tag it was nobody knows */
     if (over) fail(TOO_LONG, "");
     else if (sum < 0) fail(CHECKSUM, "");
     else spoken(tag < 0 ? line : line + strspn(line, "0123456789"));

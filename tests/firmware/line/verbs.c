@@ -25,7 +25,7 @@ static void id(int n, char **a)
 static void stat(int n, char **a)
 {
     (void)n, (void)a;
-    ok("tick=%llu state=%s fault=NONE sat=0 udc=%.9g", (unsigned long long)tick, state_names[state], channel_value(45));
+    ok("tick=%llu state=%s fault=%s sat=0 udc=%.9g", (unsigned long long)tick, state_names[state], fault_names[fault], channel_value(45));
 }
 
 static void meas(int n, char **a)
@@ -121,14 +121,14 @@ static void stop(int n, char **a)
 {
     (void)n, (void)a;
     if (state == FAULT) wrong_state();
-    else enter(IDLE);
+    else enter(fault ? FAULT : IDLE);
 }
 
 static void safe(int n, char **a)
 {
     (void)n, (void)a;
-    if (state >= LIFT && state <= LANDING) land(IDLE);
-    else go(IDLE);
+    if (state >= LIFT && state <= LANDING) land(fault ? FAULT : IDLE);
+    else if (state == CURRENT) go(IDLE);
     ok("%s", state_names[state]);
 }
 
@@ -142,8 +142,9 @@ static void stay(int n, char **a)
 static void clear(int n, char **a)
 {
     (void)n, (void)a;
-    if (state == FAULT) enter(IDLE);
-    else wrong_state();
+    if (state != FAULT) { wrong_state(); return; }
+    fault = 0;
+    enter(IDLE);
 }
 
 static int axis_named(const char *name)
@@ -179,7 +180,7 @@ static void step(int n, char **a)
     else {
         step_of[k] = value;
         capture_step();
-        ok("%s=%.9g", a[0], value);
+        ok("%s=%.9g A", a[0], value);
     }
 }
 
@@ -199,7 +200,7 @@ static void hb(int n, char **a)
     double value;
     if (n != 1 || !number_of(a[0], &value)) { fail(ARGUMENTS, "COUNTER"); return; }
     heard_heartbeat((unsigned)value & 0xFFFF);
-    ok("");
+    ok("%s", a[0]);
 }
 
 static void stream(int n, char **a)
