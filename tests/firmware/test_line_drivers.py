@@ -1,0 +1,147 @@
+"""The bench's own drivers against the C controller with a command line, on TCP and on a pseudo terminal, in two dialects."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import line_programs
+import numpy as np
+import pytest
+from line_programs import KINDS, NOISE_A, PLACES, TICKS_S, controller, law, opened, rise_time
+
+from bench.errors import BenchError
+from bench.rigfile.capture import rises
+
+STEP_A = 5.0
+SIXTEEN = ("i_q_R1", "i_d_R1", "i_q_R2", "u_dc", "z", *(f"i_s{k}" for k in range(1, 7)), *(f"i_f{k}" for k in range(1, 6)))
+HOLDING = """
+import sys, time
+from pathlib import Path
+sys.path.insert(0, sys.argv[1])
+import line_programs
+with line_programs.opened(Path(sys.argv[2]), sys.argv[3], sys.argv[4]) as rig:
+    rig.levitation.enable()
+    rig.levitation.levitate()
+    print("held", flush=True)
+    rig.clock.sleep(60.0)
+"""
+
+
+@pytest.fixture(params=KINDS)
+def kind(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.fixture(params=PLACES)
+def place(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+def crossing(y: np.ndarray[Any, Any], level: float) -> float:
+    """Samples from the first to where the level is first reached, between two on a straight line."""
+    k = int(np.argmax(y >= level))
+    return float(k - 1 + (level - y[k - 1]) / (y[k] - y[k - 1]))
+
+
+def test_a_run(line_program: Path, rig_folder: Path, kind: str, place: str) -> None:
+    with controller(line_program, place, kind) as there, opened(rig_folder, kind, there.url) as rig:
+        c = rig.levitation
+        c.enable()
+        assert c.mode == "READY"
+        assert c.get("kp.b") == 680000
+        c.set("kp.b", 7e5)
+        assert c.get("kp.b") == 7e5
+        with pytest.raises(BenchError, match=r"kp\.b"):
+            c.set("kp.b", 3e6)
+        c.levitate()
+        assert c.mode == "LEVITATED"
+        assert c.reading("z") == pytest.approx(8e-3, abs=10e-6)
+        c.set("ref_z", 6e-3)
+        line_programs.until(lambda: abs(c.reading("z") - 6e-3) < 10e-6 or rig.clock.sleep(0.01) is not None)
+        c.land()
+        assert c.mode == "READY"
+        c.disable()
+        assert c.mode == "OFF"
+        health = rig.health()
+    n = health.counters
+    assert (n.lost, n.duplicates, n.reordered, n.wrong_length, n.unknown, n.reboots) == (0, 0, 0, 0, 0, 0)
+    assert health.stats.crc_errors == 0
+
+
+def test_a_step_of_a_current(line_program: Path, rig_folder: Path, kind: str, place: str) -> None:
+    """16 channels at 280 kHz about the step: the law in closed form, sample by sample, and its rise time."""
+    with controller(line_program, place, kind) as there, opened(rig_folder, kind, there.url) as rig:
+        rig.levitation.enable()
+        assert rig.capture is not None
+        rig.capture.arm(SIXTEEN, seconds=0.02, before_s=0.005, trigger=rises("i_q_R1", STEP_A / 2))
+        rig.clock.sleep(0.05)
+        rig.levitation.set("step_q_R1", STEP_A)
+        rig.capture.wait(5.0)
+        data = rig.capture.upload()
+        rig.levitation.set("step_q_R1", 0.0)
+        rig.levitation.disable()
+    now = {name: np.asarray(v) for name, v in data.columns.items()}
+    y = now["i_q_R1"]
+    assert sorted(now) == sorted(SIXTEEN)
+    assert len(y) == 5600
+    assert data.rate_hz == pytest.approx(TICKS_S)
+    measured = (crossing(y, 0.9 * STEP_A) - crossing(y, 0.1 * STEP_A)) / TICKS_S
+    assert measured == pytest.approx(rise_time(), rel=0.02)
+    at, n = round(crossing(y, 0.5 * STEP_A)), np.arange(5600)
+    assert abs(at - 1400) <= 1  # the trigger
+    left = [np.std(y - STEP_A * law((n - k) / TICKS_S)) for k in range(at - 30, at)]
+    assert min(left) == pytest.approx(NOISE_A, rel=0.05)  # nothing but noise is left of it, from one tick on
+    assert sorted(left)[1] > 2 * NOISE_A
+    settled = {name: float(np.mean(v[2800:])) for name, v in now.items()}
+    assert [settled[x] for x in ("i_d_R1", "i_q_R2", "z")] == pytest.approx([0, 0, 0], abs=1e-3)
+    assert settled["u_dc"] == pytest.approx(400, abs=0.05)
+    phases = np.arange(6) * np.pi / 3
+    assert [settled[f"i_s{k}"] for k in range(1, 7)] == pytest.approx(list(-STEP_A * np.sin(phases)), abs=2e-3)
+    assert [settled[f"i_f{k}"] for k in range(1, 6)] == pytest.approx(list(-STEP_A * np.sin(phases[:5])), abs=2e-3)
+
+
+def test_everything_at_once(line_program: Path, rig_folder: Path, kind: str) -> None:
+    """All 62 channels at 35 kHz while telemetry goes on."""
+    with controller(line_program, "tcp", kind) as there, opened(rig_folder, kind, there.url) as rig:
+        assert rig.capture is not None
+        rig.capture.arm(rig.capture.channels, seconds=0.2, rate_hz=35_000)
+        rig.capture.wait(5.0)
+        data = rig.capture.upload()
+        counters = rig.health().counters
+    assert len(data.columns) == 62
+    assert {len(v) for v in data.columns.values()} == {7000}
+    assert (counters.lost, counters.gaps) == (0, 0)
+
+
+def test_a_killed_controller_is_noticed(line_program: Path, rig_folder: Path, place: str) -> None:
+    with controller(line_program, place) as there:
+        with pytest.raises(BenchError) as told, opened(rig_folder, "lira", there.url) as rig:
+            rig.levitation.enable()
+            there.process.kill()
+            rig.clock.sleep(10.0)
+    print(type(told.value), told.value)
+
+
+def test_a_killed_bench_leaves_a_controller_that_lands(
+    line_program: Path, rig_folder: Path, kind: str, place: str
+) -> None:
+    with controller(line_program, place, kind) as there:
+        words = (str(Path(__file__).parent), str(rig_folder), kind, there.url)
+        with subprocess.Popen([sys.executable, "-c", HOLDING, *words], stdout=subprocess.PIPE, text=True) as bench:
+            assert bench.stdout
+            assert bench.stdout.readline().strip() == "held"
+            bench.send_signal(signal.SIGKILL)
+            killed = time.monotonic()
+            _, beat, _, lost, state = there.said().split()
+            after = time.monotonic() - killed
+        landed = there.said().split()
+    assert state == "LEVITATED"
+    assert 0.08 <= (int(lost) - int(beat)) / TICKS_S <= 0.1
+    assert after < 0.5  # by this machine's clock, as busy as it is: no process of the bench goes on
+    assert landed[0::2] == ["landed", "FAULT"]
+    assert 0.3 <= (int(landed[1]) - int(lost)) / TICKS_S < 0.31
