@@ -8,8 +8,7 @@ import shutil
 import socket
 import subprocess
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -101,11 +100,3 @@ def opened(folder: Path, kind: str, url: str) -> Iterator[Rig]:
         rig = with_links(load_rig(str(folder / "rigs" / f"{kind}.toml")), links)
         with opening.live(rig, "auto")(Supervisor()) as there:
             yield there.rig
-
-
-def until(done: Callable[[], bool], seconds: float = 20.0) -> None:
-    """Wait for something."""
-    end = time.monotonic() + seconds
-    while not done():
-        assert time.monotonic() < end
-        time.sleep(0.01)

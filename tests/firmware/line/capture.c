@@ -140,7 +140,7 @@ static void arm(int words, char **word)
     }
     c.length = (uint64_t)length, c.before = (uint64_t)before, c.width = 2 * n;
     c.total = c.start = c.at = 0, c.fresh = 1, c.state = ARMED;
-    c.number = c.number % 0xFFFD + 1;
+    c.number = c.number % (dialect ? 0xFFFD : 0xFFFE) + 1;
     reading.open = 0;
     ok("%u bytes=%llu", c.number, (unsigned long long)bytes());
 }

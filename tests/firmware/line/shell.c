@@ -210,7 +210,8 @@ void shell_byte(uint8_t byte)
     if (byte == '\r') return;
     if (byte == '\n') {
         if (mode.echo) out("\r\n", 2);
-        if (length || over) end_of_line();
+        line[length] = 0;
+        if (over || strspn(line, " ") < length) end_of_line();
         length = 0, over = 0;
         prompt();
     } else if (byte == 0x08 || byte == 0x7F) {

@@ -30,16 +30,17 @@ static void stat(int n, char **a)
 
 static void meas(int n, char **a)
 {
-    int all = n == 1 && !strcmp(a[0], "all"), named = 0;
+    int all = n == 1 && !strcmp(a[0], "all");
     if (!n) { fail(ARGUMENTS, "NAME..|all"); return; }
     for (int k = 0; !all && k < n; k++) if (channel_named(a[k]) < 0) { fail(ARGUMENTS, "unknown channel %.40s", a[k]); return; }
-    for (int k = 0; k < (all ? CHANNELS : n); k++, named++) {
+    int named = all ? CHANNELS : n;
+    if (named > 1) more("tick=%llu", (unsigned long long)tick);
+    for (int k = 0; k < named; k++) {
         struct channel *c = &channels[all ? k : channel_named(a[k])];
         double value = channel_value((int)(c - channels));
-        if (!all && n == 1) ok("%s=%.9g %s", c->name, value, c->unit);
-        else more("%s=%.9g %s", c->name, value, c->unit);
+        if (named == 1) ok("tick=%llu %s=%.9g %s", (unsigned long long)tick, c->name, value, c->unit);
+        else (k + 1 < named ? more : ok)("%s=%.9g %s", c->name, value, c->unit);
     }
-    if (named != 1) ok("%d", named);
 }
 
 static void list(int n, char **a)
@@ -161,6 +162,7 @@ static void ref(int n, char **a)
     if (k < 0 || n > 4 || !number_of(a[1], &value) || (n > 2 && !number_of(a[2], &rate)) ||
         (n > 3 && !number_of(a[3], &acceleration)))
         fail(ARGUMENTS, "AXIS VALUE [RATE ACCEL]");
+    else if (state < CURRENT || state == FAULT) wrong_state();
     else if (value < low[k] || value > high[k]) fail(RANGE, "%s %.9g..%.9g", a[0], low[k], high[k]);
     else {
         moves[k].goal = value, moves[k].rate = rate;
@@ -187,12 +189,17 @@ static void step(int n, char **a)
 static void inj(int n, char **a)
 {
     double amplitude, hz;
-    if (n == 1 && !strcmp(a[0], "off")) inject(-1, 0, 0, 0);
-    else if (n != 4 || axis_named(a[0]) < 0 || !number_of(a[2], &amplitude) || !number_of(a[3], &hz)) {
+    if (n == 1 && !strcmp(a[0], "off")) {
+        inject(-1, 0, 0, 0);
+        ok("off");
+        return;
+    }
+    if (n != 4 || axis_named(a[0]) < 0 || !number_of(a[2], &amplitude) || !number_of(a[3], &hz)) {
         fail(ARGUMENTS, "AXIS sensor|ref|force AMPLITUDE HZ or off");
         return;
-    } else inject(axis_named(a[0]), !strcmp(a[1], "sensor"), amplitude, hz);
-    ok("");
+    }
+    inject(axis_named(a[0]), !strcmp(a[1], "sensor"), amplitude, hz);
+    ok("%s %s %.9g %.9g", a[0], a[1], amplitude, hz);
 }
 
 static void hb(int n, char **a)
@@ -210,7 +217,7 @@ static void stream(int n, char **a)
     else if (hz < 0 || hz > 1000 || hz != floor(hz) || (hz > 0 && 35000 % (int)hz)) fail(RANGE, "a divisor of 35000, at most 1000");
     else {
         stream_set((unsigned)hz);
-        ok("");
+        ok("%s", a[0]);
     }
 }
 
@@ -234,7 +241,7 @@ static int onoff(const char *verb, int n, char **a)
         int yes = n == 1 && !strcmp(a[0], "on");
         if (!yes && (n != 1 || strcmp(a[0], "off"))) { fail(ARGUMENTS, "on|off"); return 1; }
         *switches[k].value = yes;
-        ok("");
+        ok("%s", a[0]);
         return 1;
     }
     return 0;
