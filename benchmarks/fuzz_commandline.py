@@ -77,6 +77,8 @@ def _oracle(stream: bytes) -> list[Line | Part]:
                 and len(told) == 4
                 and zlib.crc32(stream[at + 2 : end]).to_bytes(4, "little") == told
             ):
+                if spoilt:  # a block stands between lines
+                    line, spoilt = bytearray(), False
                 out.append(Part(number, offset, stream[at + 10 : end]))
                 at = end + 4
                 continue

@@ -118,7 +118,7 @@ class Dialogue:
         self, message: str, requests: Sequence[Mapping[str, float]], reply: str, key: str, wait: Callable[..., None]
     ) -> dict[float, dict[str, float]]:
         """Send many requests at once and wait for their replies; by the value of their signal `key`. Those without a
-        reply are sent again, as `ask` does.
+        reply are sent again, as `ask` does, and as long as each time some more are answered.
 
         Raises:
             NoReply: one is not answered.
@@ -135,7 +135,7 @@ class Dialogue:
             found.update({v[key]: v for n, v, *_ in self._answers if n == reply})
             return all(values[key] in found for values in requests)
 
-        self._waited(send, wait, arrived, reply, f"the replies to {message}")
+        self._waited(send, wait, arrived, reply, f"the replies to {message}", answered=lambda: len(found))
         return found
 
     def _next_token(self, message: str) -> None:
@@ -149,20 +149,24 @@ class Dialogue:
 
     def _waited(
         self, send: Callable[[], None], wait: Callable[..., None], arrived: Callable[[], bool], reply: str, what: str,
-        again: Callable[[], bool] = lambda: True,
+        again: Callable[[], bool] = lambda: True, answered: Callable[[], int] = lambda: 0,
     ) -> None:  # fmt: skip
-        """Send, wait for the reply, send again. Where it came but did not fit, the error says so."""
-        for self.asked in range(1, ATTEMPTS + 1):
+        """Send, wait for the reply, send again: ATTEMPTS times that brought no answer. Where it came but did not fit, the
+        error says so."""
+        self.asked = vain = before = 0
+        while True:
+            self.asked += 1
             self.repeats += self.asked > 1
             send()
             try:
                 return wait(arrived, patience_s(self._rig), what)
             except NoReply as error:
-                if self.asked < ATTEMPTS and not again():
+                vain, before = (vain + 1 if answered() == before else 0), answered()
+                if vain < ATTEMPTS and not again():
                     raise NoReply(
                         f"{error}; it was not sent again, as the machine is no longer seen fit for it"
                     ) from error
-                if self.asked == ATTEMPTS:
+                if vain == ATTEMPTS:
                     raise NoReply(f"{error}, though it was asked for {ATTEMPTS} times{self._seen(reply)}") from error
 
     def _seen(self, reply: str) -> str:

@@ -169,3 +169,12 @@ def test_arbitrary_bytes_never_crash(parts: list[bytes]) -> None:
 def test_a_checksum_is_that_of_the_bytes() -> None:
     assert checksum("AB") == 0x41 ^ 0x42
     assert with_checksum("AB") == "AB*03"
+
+
+def test_a_damaged_block_spoils_no_line_after_a_good_one() -> None:
+    """Its bytes have no end of a line: they would hold the next line, however many good blocks come between."""
+    damaged = block(0xFFFF, 1, b"\x81" * 40)[:-1]
+    splitter = Splitter()
+    found = splitter.feed(damaged + block(0xFFFF, 2, bytes(40)) + block(0xFFFF, 3, bytes(40)) + b"4 ok\r\n")
+    assert [type(piece).__name__ for piece in found] == ["Block", "Block", "Line"]
+    assert found[-1] == Line("4 ok")

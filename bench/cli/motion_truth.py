@@ -20,7 +20,7 @@ from bench.rigfile.aliases import known_as
 
 if TYPE_CHECKING:
     from bench.cli.virtual import Simulated
-    from procedures.amb_rotor.conventions import AmbRotor
+    from procedures.amb_rotor.machine import AmbRotor
     from sim_backend.motion import Whirl
 
 MARGIN_POINTS = 20000

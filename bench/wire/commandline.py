@@ -182,6 +182,7 @@ class Splitter:
                 if size == 0 and not final:
                     break
                 if found is not None:
+                    self._drop()
                     out.append(found)
                     at += size
                     continue
@@ -225,6 +226,13 @@ class Splitter:
             self._spoilt = True
             self.dropped += len(self._line) - LONGEST
             del self._line[LONGEST:]
+
+    def _drop(self) -> None:
+        """A block stands between lines: what came before it of a line that cannot be one is over."""
+        if self._spoilt:
+            self.dropped += len(self._line)
+            self._line.clear()
+            self._spoilt = False
 
     def _ended(self) -> list[Line | Block]:
         """The line that ends here, if it is one."""

@@ -8,7 +8,8 @@ from collections.abc import Iterable, Iterator
 from bench.findings import Finding
 from bench.rigfile import RigFile
 from bench.rigfile.places import PlaceError, Places
-from procedures.amb_rotor.conventions import AmbRotor, conventions
+from procedures.amb_rotor.conventions import conventions
+from procedures.amb_rotor.machine import AmbRotor
 
 SQUARE = math.sin(math.radians(1.0))  # of a cosine: axes that are so near to right angles are meant to be
 

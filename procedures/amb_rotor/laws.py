@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from procedures.amb_rotor.conventions import AmbRotor
+from procedures.amb_rotor.machine import AmbRotor
 
 
 def of_laws(machine: AmbRotor, key: str, laws: Iterable[str]) -> Iterator[str]:

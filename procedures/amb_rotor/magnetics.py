@@ -24,7 +24,8 @@ import numpy.typing as npt
 
 from bench.errors import AnalysisError
 from bench.rigfile.numbers import Sum
-from procedures.amb_rotor.conventions import AMB_ROTOR, AmbRotor
+from procedures.amb_rotor.conventions import AMB_ROTOR
+from procedures.amb_rotor.machine import AmbRotor
 from procedures.amb_rotor.stations import Placed, row, upward
 from procedures.shared import leastsquares
 from procedures.shared.leastsquares import Fit

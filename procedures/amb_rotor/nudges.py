@@ -16,8 +16,9 @@ import numpy.typing as npt
 from bench.findings import Effect, Finding
 from bench.recording import Recording
 from bench.rigfile import RigFile
-from procedures.amb_rotor.conventions import AmbRotor, conventions
+from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.geometry import Facts, centre, nominal
+from procedures.amb_rotor.machine import AmbRotor
 
 Array = npt.NDArray[np.float64]
 PROBE = "probe"

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
-from procedures.amb_rotor.conventions import AmbRotor
+from procedures.amb_rotor.machine import AmbRotor
 
 Array = npt.NDArray[np.float64]
 ONSET, BEFORE_S = 4, 0.03  # periods of the telemetry; s
@@ -34,26 +34,35 @@ def onset(
     lag_s: float,
     window_s: float | None = None,
     period_s: float = 0.0,
+    answers: int = 1,
 ) -> tuple[float, float]:
     """When the set point jumped, s on the time of the samples `t` (n,), and the jump of `current` (n,) over its noise.
 
     i = i_0 + J u(t) + c v(t), u the amplifiers' answer to a step and v the square of the time since, for the rotor that begins
     to follow; each averaged over the `ticks` readings of a sample. The start with the least misfit is taken, over `window_s`
     from it on (by default ONSET periods: `period_s`, or that of the readings where it is not told).
+
+    Where the samples are those of many `answers` laid over each other they tell more: a term c' v' is fitted besides, v' the
+    time since, for a rate that a fast loop turns round within the window; and the noise is that of the jump which they make
+    together, as if all that is left of one answer were alike.
     """
     window = ONSET * max(ticks * tick, period_s) if window_s is None else window_s
     reads = t[:, None] - tick * np.arange(1, ticks + 1)
     near = (t > earliest - BEFORE_S) & (t < latest + window)
+    many = answers > 1
 
-    def fitted(t_0: float) -> tuple[float, float, float]:
+    def fitted(t_0: float) -> tuple[float, float, float, float]:
         use = near & (t < t_0 + window)
         since = np.maximum(reads[use] - t_0 - DELAY_TICKS * tick, 0.0)
         answer = (1 - np.exp(-since / lag_s)).mean(axis=1)
-        design = np.column_stack([np.ones(use.sum()), answer, (since**2).mean(axis=1) / window**2])
+        powers = [(since**k).mean(axis=1) / window**k for k in ((1, 2) if many else (2,))]
+        design = np.column_stack([np.ones(use.sum()), answer, *powers])
         terms, *_ = np.linalg.lstsq(design, current[use], rcond=None)
-        return float(((current[use] - design @ terms) ** 2).mean()), t_0, float(terms[1])
+        share = math.sqrt(np.linalg.pinv(design.T @ design)[1, 1] * use.sum() / answers) if many else 1.0
+        return float(((current[use] - design @ terms) ** 2).mean()), t_0, float(terms[1]), share
 
-    _, about, _ = min(fitted(t_0) for t_0 in np.arange(earliest - tick, latest + COARSE_S, COARSE_S))
-    _, found, jump = min(fitted(t_0) for t_0 in np.arange(about - COARSE_S, about + COARSE_S, FINE_S))
+    _, about, *_ = min(fitted(t_0) for t_0 in np.arange(earliest - tick, latest + COARSE_S, COARSE_S))
+    _, found, jump, share = min(fitted(t_0) for t_0 in np.arange(about - COARSE_S, about + COARSE_S, FINE_S))
     rest = t < earliest
-    return float(found) - LATE_S, abs(jump) / max(float(current[rest].std()), 1e-12) if rest.sum() > 5 else 0.0
+    noise = max(float(current[rest].std()) * share, 1e-12)
+    return float(found) - (0.0 if many else LATE_S), abs(jump) / noise if rest.sum() > 5 else 0.0

@@ -12,7 +12,8 @@ import numpy.typing as npt
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
 from bench.rigfile.roles import STATUS
-from procedures.amb_rotor.conventions import AmbRotor, conventions
+from procedures.amb_rotor.conventions import conventions
+from procedures.amb_rotor.machine import AmbRotor
 from procedures.amb_rotor.magnetics import Positions
 from procedures.shared.step_table import reduced
 

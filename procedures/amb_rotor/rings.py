@@ -20,9 +20,10 @@ import numpy.typing as npt
 from bench.findings import Effect, Finding
 from bench.recording import Recording, Step
 from bench.rigfile import RigFile
-from procedures.amb_rotor import pressed
-from procedures.amb_rotor.conventions import AmbRotor, conventions
+from procedures.amb_rotor import carrying, pressed
+from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.geometry import at_rings, ideal
+from procedures.amb_rotor.machine import AmbRotor
 from procedures.amb_rotor.places import LIFT, LIFT_LOST, REST
 from procedures.amb_rotor.stations import Ring, Stations, halved, stated, stations
 
@@ -208,11 +209,15 @@ def _of_lift(step: Step, fault: str, rig: RigFile) -> Finding:
     if machine.probed and (known := pressed.known(rig)) is not None:
         found = _exchanged(step, text, rig, machine, known)
         return found or Finding(
-            "lift-lost", f"{text}; where it lies points to no exchange of probes.", "lift", Effect.ERROR
+            "lift-lost",
+            f"{text}; where it lies points to no exchange of probes{carrying.added(rig)}.",
+            "lift",
+            Effect.ERROR,
         )
     return Finding(
-        "lift-lost", f"{text}. Whether probes are exchanged is not told: {pressed.UNKNOWN}.", "lift", Effect.ERROR
-    )
+        "lift-lost", f"{text}{carrying.added(rig)}. Whether probes are exchanged is not told: {pressed.UNKNOWN}.", "lift",
+        Effect.ERROR,
+    )  # fmt: skip
 
 
 def _exchanged(step: Step, text: str, rig: RigFile, machine: AmbRotor, known: pressed.Known) -> Finding | None:

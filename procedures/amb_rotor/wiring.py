@@ -11,9 +11,10 @@ import numpy as np
 from bench.findings import Effect, Finding
 from bench.recording import Recording
 from bench.rigfile.roles import STATUS
-from procedures.amb_rotor import nudges, pushes, rings
-from procedures.amb_rotor.conventions import AmbRotor, conventions
+from procedures.amb_rotor import carrying, nudges, pushes, rings
+from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.lift import LIFT, LIFT_LOST, NO_SPEED, REST
+from procedures.amb_rotor.machine import AmbRotor
 
 UNEVEN = 0.6  # of the rise
 
@@ -106,9 +107,10 @@ def _of_lift(recording: Recording[Any], machine: AmbRotor, fault: str) -> Iterat
             f"{text or 'its path points to nothing'}; pushes before the lift showed that the probes count the right way along "
             f"their axes: suspect the coils first"
         )
+    force = carrying.added(recording.rig)
     yield Finding(
         "lift-lost",
-        f"the rotor was lost in the lift ({fault}); {text or 'no wiring is suspected by its path'}.",
+        f"the rotor was lost in the lift ({fault}); {text or 'no wiring is suspected by its path'}{force}.",
         where,
         Effect.ERROR,
     )

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from bench.procedure import BenchPlan
 from bench.units import RPM
-from procedures.amb_rotor.conventions import Law
+from procedures.amb_rotor.machine import Law
 
 
 class Plan(BenchPlan):

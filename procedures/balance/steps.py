@@ -19,7 +19,8 @@ from bench.rigfile import RigFile
 from bench.rigfile.capture import CaptureData
 from bench.rigfile.roles import answered, resolved
 from bench.samples import TICKS
-from procedures.amb_rotor.conventions import AmbRotor, conventions
+from procedures.amb_rotor.conventions import conventions
+from procedures.amb_rotor.machine import AmbRotor
 from procedures.balance.planes import names_of
 from procedures.shared.sampled import of_telemetry
 from procedures.synchronous import mark

@@ -9,7 +9,7 @@ import numpy as np
 from bench.findings import Effect, Finding
 from bench.uncertainty import Estimate, Influence, coverage_factor, welch_satterthwaite
 from procedures.amb_rotor import magnetics
-from procedures.amb_rotor.conventions import AmbRotor
+from procedures.amb_rotor.machine import AmbRotor
 from procedures.amb_rotor.places import Held
 from procedures.bearing_model.estimates import Analysis
 from procedures.bearing_model.plan import Plan

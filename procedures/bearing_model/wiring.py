@@ -13,7 +13,8 @@ from bench.errors import AnalysisError
 from bench.findings import Effect, Finding
 from bench.rigfile import RigFile
 from procedures.amb_rotor import magnetics
-from procedures.amb_rotor.conventions import AmbRotor, conventions
+from procedures.amb_rotor.conventions import conventions
+from procedures.amb_rotor.machine import AmbRotor
 from procedures.amb_rotor.magnetics import Positions, Statics, gap_key
 from procedures.amb_rotor.places import Held
 from procedures.bearing_model.estimates import find_unloaded

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from bench.units import RPM
-from procedures.amb_rotor.conventions import Variant
+from procedures.amb_rotor.machine import Variant
 from procedures.unbalance import plan as unbalance
 
 SAME = 1e-6  # of a speed

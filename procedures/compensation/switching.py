@@ -19,7 +19,8 @@ from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
 from bench.uncertainty.estimate import merged
-from procedures.amb_rotor.conventions import AmbRotor, conventions
+from procedures.amb_rotor.conventions import conventions
+from procedures.amb_rotor.machine import AmbRotor
 from procedures.shared.certificates import certified
 
 Array = npt.NDArray[np.float64]

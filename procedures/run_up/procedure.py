@@ -132,11 +132,19 @@ def pass_speeds(rig: Rig, plan: Passing, record: Recorder, direction: str, goal:
         near = max(0.5, NEAR_END * goal)
         while (drive.speed_rad_s < goal - near) if up else (drive.speed_rad_s > goal + near):
             if left() <= 0:
-                why = f"after {patience:.0f} s it turns at {drive.speed_rad_s * RPM:.0f} r/min"
-                record.event(NO_SPEED, wanted=goal, why=why)
+                record.event(NO_SPEED, wanted=goal, why=late(patience, drive.speed_rad_s, rate))
                 return
             rig.clock.sleep(LOOK_S)
         rig.clock.sleep(HOLD_S if up else 0.0)
+
+
+def late(patience: float, rad_s: float, rate: float) -> str:
+    """What a passage that took too long came to, and the way out."""
+    reached = f"after {patience:.0f} s it turns at {rad_s * RPM:.0f} r/min. "
+    if rate:
+        return f"{reached}The drive does not keep its ramp of {rate:g} rad/s^2: ramp more slowly, or look at its torque limit"
+    return (f"{reached}It coasts, and its drag slows it no further in that time: set bottom_rad_s above {rad_s:.0f} rad/s, or "
+            "let the drive ramp it down (deceleration_rad_s2)")  # fmt: skip
 
 
 def _arm(rig: Rig, plan: Passing, speed: float) -> None:

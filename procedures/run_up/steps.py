@@ -19,7 +19,8 @@ from bench.errors import AnalysisError
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.rigfile.roles import STATUS
-from procedures.amb_rotor.conventions import AmbRotor, conventions
+from procedures.amb_rotor.conventions import conventions
+from procedures.amb_rotor.machine import AmbRotor
 from procedures.shared.sampled import of_telemetry
 from procedures.shared.signals import clips
 from procedures.synchronous import mark

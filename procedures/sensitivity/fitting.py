@@ -12,12 +12,13 @@ from bench.rigfile.envelope import Envelope
 from bench.units import RPM
 from procedures.amb_rotor.conventions import conventions
 from procedures.sensitivity import sines
-from procedures.sensitivity.injection import Comb, find_refusal, in_whole_samples
+from procedures.sensitivity.injection import Comb, find_refusals, in_whole_samples
 from procedures.sensitivity.plan import Plan
 from procedures.sensitivity.steps import REFINED, captured_channels
 from procedures.shared.limits import landing_speed
 from procedures.shared.rates import of_rate
 
+WIDER = "If the controller can do it, widen that parameter's range in the rig file"
 LEAST_S = 4.0  # of a capture of the second grid: four periods of the finest
 
 
@@ -43,13 +44,7 @@ def of_plan(rig: RigFile, plan: Plan, combs: Sequence[tuple[str, Comb]]) -> Iter
 
 
 def _injection(rig: RigFile, plan: Plan, combs: Sequence[tuple[str, Comb]]) -> Iterator[str]:
-    one = sines.makes_one(rig)
-    refined = Comb(plan.low_hz, plan.low_hz, 128, plan.amplitude_A)  # at most, in the second pass
-    greatest = max([*(c for _, c in combs), *(() if one else (refined,))], key=lambda c: c.peak)
-    can = rig.capabilities.injection
-    if can is not None and (why := find_refusal(Envelope(rig), can, greatest)):
-        key, found = ("sine_A", greatest.amplitude) if one else ("amplitude_A", plan.amplitude_A)
-        yield f"{key}: found {found:g} A for each line; expected less: {why}"
+    yield from _refusals(rig, plan, [c for _, c in combs])
     steps = (("low_hz", plan.low_hz), ("high_step_hz", plan.high_step_hz), ("scan_step_hz", plan.scan_step_hz or 1.0))
     for key, value in steps:
         if math.log2(value) % 1:
@@ -66,6 +61,34 @@ def _injection(rig: RigFile, plan: Plan, combs: Sequence[tuple[str, Comb]]) -> I
                "within a few of these: expected another of the controller's rates")  # fmt: skip
         break
     yield from _memory(rig, plan, combs)
+
+
+def _refusals(rig: RigFile, plan: Plan, combs: Sequence[Comb]) -> Iterator[str]:
+    """What the envelope and the ranges of the controller's parameters refuse, by the setting that asks for it."""
+    can, envelope = rig.capabilities.injection, Envelope(rig)
+    if can is None:
+        return
+    one = sines.makes_one(rig)
+    amplitude = "sine_A" if one else "amplitude_A"
+    refined = Comb(plan.low_hz, plan.low_hz, 128, plan.amplitude_A)  # at most, in the second pass
+    told: set[str] = set()
+    for comb in sorted([*combs, *(() if one else (refined,))], key=lambda c: -c.peak):
+        for what, why in find_refusals(envelope, can, comb).items():
+            if what in told:
+                continue
+            told.add(what)
+            if what == "peak" and not rig.envelope.max_injection_A:
+                yield (f"envelope.max_injection_A: found {rig.envelope.max_injection_A or 'none'}; expected what may be added "
+                       f"to a current reference, A: {comb.peak:.3g} A or more for this plan's {amplitude}")  # fmt: skip
+            elif what == "lines":
+                yield f"capabilities.injection.lines: found {comb.count} lines at once: {why}. {WIDER}"
+            elif what == "step":
+                yield f"low_hz, high_step_hz, scan_step_hz: found {comb.step:g} Hz between lines: {why}. {WIDER}"
+            elif what == "hz":
+                yield f"low_hz, high_hz: found lines from {comb.first:g} Hz on: {why}. {WIDER}"
+            else:
+                share = f"for each of {comb.count} lines" if comb.count > 1 else "for the sine"
+                yield f"{amplitude}: found {comb.amplitude:g} A {share}; expected less: {why}"
 
 
 def _memory(rig: RigFile, plan: Plan, combs: Sequence[tuple[str, Comb]]) -> Iterator[str]:

@@ -83,10 +83,14 @@ def parameters_of(can: Injection, comb: Comb) -> dict[str, float]:
     return {name: value for name, value in values if name}
 
 
-def find_refusal(envelope: Envelope, can: Injection, comb: Comb) -> str:
-    """Why the envelope refuses it; empty where it does not."""
-    problems = [*envelope.problems_of(parameters_of(can, comb)), envelope.injection_problem(comb.peak)]
-    return "; ".join(p for p in problems if p)
+def find_refusals(envelope: Envelope, can: Injection, comb: Comb) -> dict[str, str]:
+    """Why the envelope refuses it, by what of the injection is refused: `hz`, `step`, `lines`, `amplitude`, `peak`; empty where
+    it does not."""
+    bound = {"hz": can.hz, "step": can.step, "lines": can.lines, "amplitude": can.amplitude}
+    values = parameters_of(can, comb)
+    found = {key: "; ".join(envelope.problems_of({name: values[name]})) for key, name in bound.items() if name}
+    found["peak"] = envelope.injection_problem(comb.peak)
+    return {key: why for key, why in found.items() if why}
 
 
 @contextmanager

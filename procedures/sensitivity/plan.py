@@ -5,7 +5,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from bench.procedure import BenchPlan
-from procedures.amb_rotor.conventions import Law
+from procedures.amb_rotor.machine import Law
 
 
 class Plan(BenchPlan):

@@ -16,7 +16,8 @@ from bench.errors import AnalysisError
 from bench.recording import Recording, Step
 from bench.rigfile.roles import SPEED, STATUS
 from bench.units import RPM
-from procedures.amb_rotor.conventions import AmbRotor, conventions
+from procedures.amb_rotor.conventions import conventions
+from procedures.amb_rotor.machine import AmbRotor
 from procedures.sensitivity.injection import in_whole_samples
 from procedures.shared.signals import clips
 

@@ -24,7 +24,7 @@ from bench.rigfile.roles import SPEED, STATUS, is_bound
 from bench.uncertainty import Estimate
 from procedures.amb_rotor.conventions import conventions
 from procedures.spindown import coasts, fit
-from procedures.spindown.coasts import COAST, SPIN, Coasting, read_coasts, slowest
+from procedures.spindown.coasts import COAST, SPIN, Coasting, Short, read_coasts, slowest
 from procedures.spindown.plan import Plan
 from procedures.synchronous import mark
 
@@ -90,7 +90,10 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Coasted:
     """B and T_c by the inertia of the rig file."""
     findings.gate(_before(recording))
     plan, rig = recording.plan, recording.rig
-    runs = read_coasts(recording)
+    try:
+        runs = read_coasts(recording)
+    except Short as error:
+        findings.end(Finding("run-down-short", str(error), "B", Effect.ERROR))
     findings.gate(coasts.of_runs(runs, conventions(rig), plan))
     found = coasts.estimates_of(runs, rig)
     findings.add(coasts.of_result(runs, found, plan))

@@ -17,7 +17,7 @@ from bench.recording import Recording, Step
 from bench.rigfile import RigFile
 from bench.rigfile.roles import STATUS
 from bench.uncertainty import Estimate, Influence, propagate
-from procedures.amb_rotor.conventions import AmbRotor
+from procedures.amb_rotor.machine import AmbRotor
 from procedures.shared import signals
 from procedures.spindown import fit
 from procedures.spindown.checks import drives_on
@@ -31,10 +31,15 @@ SPIN, COAST = "spin", "coast"
 LAGS = 20  # edges over which the residuals may repeat themselves
 TIMED_S = 2e-6  # how well an edge is timed, at least: waves of as much of a turn are none
 WAVE_RAD = 1.5e-3  # and no less: of an angle that is told in steps
+FEWEST = 400  # edges that tell viscous from constant drag
 SLOWEST_BY_ANGLE, SLOWEST = (
     15.0,
     2.0,
 )  # rad/s: below, the angle is not carried on from the mark, or edges come too seldom
+
+
+class Short(AnalysisError):
+    """A run-down of too few edges of the mark."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +70,8 @@ def read_coasts(recording: Recording[Plan]) -> tuple[Coasting, ...]:
     """Every run-down.
 
     Raises:
-        AnalysisError: there are none, or one has too few edges.
+        AnalysisError: there are none, or one has no edges.
+        Short: one has too few edges.
     """
     found = tuple(_read(recording, step) for step in recording.steps(COAST))
     if not found:
@@ -85,9 +91,33 @@ def _read(recording: Recording[Plan], step: Step) -> Coasting:
     at, angle = tacho.times[first:last], 2 * math.pi * tacho.turns[first:last]
     if len(at) < 2:
         raise AnalysisError(f"run-down {int(step.labels['repeat']) + 1}: found no edges above the end speed")
+    if len(at) < FEWEST:
+        reached = bool(below.size) or bool(speed[-1] <= 1.05 * max(plan.end_speed_rad_s, slowest(rig)))
+        ends = float(speed[first]), float(speed[last - 1])
+        raise Short(f"run {int(step.labels['repeat']) + 1}: {lacking(len(at), ends, plan, rig, reached=reached)}")
     since, turned = at - at[0], (angle - angle[0]).astype(np.float64)
-    return Coasting(int(step.labels["repeat"]), since, turned, fit.of_angle(since, turned, LAGS), tacho, step.lost(),
+    return Coasting(int(step.labels["repeat"]), since, turned, fit.of_angle(since, turned, LAGS, FEWEST), tacho, step.lost(),
                     step.expected(), int(np.bitwise_or.reduce(data[STATUS].astype(np.int64))))  # fmt: skip
+
+
+def lacking(edges: int, ends: tuple[float, float], plan: Plan, rig: RigFile, *, reached: bool) -> str:
+    """What a run-down of so few edges from one speed to another, rad/s, lacks, and how to give it."""
+    first, last = ends
+    text = (f"the mark gives {edges} edges from {first:.3g} to {last:.3g} rad/s; {FEWEST} or more are needed to tell viscous "
+            "from constant drag, one a turn. ")  # fmt: skip
+    if not reached:
+        longer = math.ceil(plan.coast_s * FEWEST / edges)
+        return f"{text}It was cut off by coast_s = {plan.coast_s:g} s: give it {longer} s at least, down to end_speed_rad_s"
+    need, most = (
+        last + (first - last) * FEWEST / edges,
+        rig.envelope.max_speed_rad_s,
+    )  # viscous: turns go with the speed lost
+    if need < most:
+        return (
+            f"{text}Start it faster: speed_rad_s = {math.ceil(need):d} or more, with a coast_s that lets it come down"
+        )
+    return (f"{text}That takes a start at about {need:.0f} rad/s; envelope.max_speed_rad_s is {most:g}. By one edge a turn the "
+            "drag of this shaft cannot be told: it wants less drag, as of a drive that uncouples, or an encoder")  # fmt: skip
 
 
 def of_runs(runs: Sequence[Coasting], machine: AmbRotor, plan: Plan) -> Iterator[Finding]:

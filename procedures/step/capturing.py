@@ -22,7 +22,7 @@ from bench.recording.captured import Captured
 from bench.rigfile import RigFile
 from bench.rigfile.capture import Layout
 from bench.rigfile.roles import STATUS
-from procedures.amb_rotor.conventions import AmbRotor
+from procedures.amb_rotor.machine import AmbRotor
 
 Array = npt.NDArray[np.float64]
 Samples = dict[str, npt.NDArray[Any]]

@@ -224,8 +224,9 @@ def of_results(
             yield Finding("band-widened", f"five times the noise of the averaged position is {widest:.1%} of the "
                                           f"step; the settling "
                           f"time is that into this band, not into {plan.band:.1%}.", case.where)  # fmt: skip
+    axes = {case.group: case.axis for case in results}
     for where, estimates in groups.items():
-        if leaning and ", x, " not in where:
+        if leaning and axes[where] != "x":
             text = (
                 "the axes of a bearing are not at right angles and each has a control of its own: a step along y or z swings "
                 "along both, with two oscillations that lie far apart. One is what would be fitted: overshoot, settling, "

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 
-from procedures.amb_rotor.conventions import AmbRotor
+from procedures.amb_rotor.machine import AmbRotor
 
 LEAST_S = 1.5  # the flatness laws know the negative stiffness: little is left to their integrators
 MOST_S = 10.0  # a slower integrator is for `warm`, or for `record_s`

@@ -15,7 +15,8 @@ from bench.errors import AnalysisError
 from bench.recording import Recording, Step
 from bench.rigfile import RigFile
 from bench.rigfile.roles import ANGLE, SPEED, STATUS
-from procedures.amb_rotor.conventions import AmbRotor, conventions
+from procedures.amb_rotor.conventions import conventions
+from procedures.amb_rotor.machine import AmbRotor
 from procedures.amb_rotor.onset import pushing
 from procedures.step import acting, capturing
 from procedures.step.position import ends_of, made_of, shares

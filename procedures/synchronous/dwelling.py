@@ -9,7 +9,8 @@ from bench.procedure.rig import Rig
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from procedures.amb_rotor import lift
-from procedures.amb_rotor.conventions import Law, Variant, conventions
+from procedures.amb_rotor.conventions import conventions
+from procedures.amb_rotor.machine import Law, Variant
 from procedures.synchronous.dwells import SLOW, TELLS, can_capture, telemetry_period_s, uncapturable
 
 

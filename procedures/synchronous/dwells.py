@@ -22,7 +22,8 @@ from bench.rigfile import RigFile
 from bench.rigfile.recorded import unrecorded
 from bench.rigfile.roles import STATUS
 from bench.units import RPM
-from procedures.amb_rotor.conventions import AmbRotor, conventions
+from procedures.amb_rotor.conventions import conventions
+from procedures.amb_rotor.machine import AmbRotor
 from procedures.shared.sampled import of_telemetry
 from procedures.shared.signals import clips
 from procedures.synchronous import facts, mark

@@ -14,7 +14,8 @@ from bench.analysis.vectors import Vectors, estimates
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence, propagate, welch_satterthwaite
 from bench.uncertainty.estimate import merged
-from procedures.amb_rotor.conventions import AmbRotor, conventions
+from procedures.amb_rotor.conventions import conventions
+from procedures.amb_rotor.machine import AmbRotor
 from procedures.synchronous import coil_peaks, facts, mark, runout
 from procedures.synchronous.bearings import Known, collect_inputs
 from procedures.synchronous.carrying import carried

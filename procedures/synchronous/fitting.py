@@ -9,13 +9,15 @@ from bench.errors import BenchError
 from bench.rigfile import RigFile
 from bench.rigfile.capture import Layout
 from bench.units import RPM
-from procedures.amb_rotor.conventions import AmbRotor, conventions
+from procedures.amb_rotor.conventions import conventions
+from procedures.amb_rotor.machine import AmbRotor
 from procedures.shared.limits import landing_speed
 from procedures.shared.rates import of_rate, rate_of
 from procedures.synchronous.bearings import has_model
 from procedures.synchronous.dwells import TELLS, can_capture, captured_channels, telemetry_period_s
 from procedures.synchronous.identified import FEWEST
 
+SLOWEST = 15.0  # rad/s, of a slow roll: two turns a second and some more
 SLOW_MOST = 0.15  # of the lowest speed of the plan, at slow roll, and of the loop's own frequency
 TURNS = 20  # that a slow roll needs
 PER_TURN = 4.0  # samples in a turn of the highest order
@@ -25,6 +27,11 @@ def of_speeds(rig: RigFile, speeds: Sequence[float]) -> Iterator[str]:
     """Speeds in rad/s that the rig does not allow."""
     most = rig.envelope.max_speed_rad_s
     landing = landing_speed(rig)
+    if most <= 2 * landing:
+        yield (f"speeds_rad_s: no speed fits: above {2 * landing * RPM:.0f} r/min, twice the landing speed, and up to "
+               f"{most * RPM:.0f} r/min (envelope.max_speed_rad_s). Expected a lower landing speed "
+               "(capabilities.landing_speed) or a greater max_speed_rad_s")  # fmt: skip
+        return
     if max(speeds) > most:
         yield f"speeds_rad_s: found {max(speeds) * RPM:.0f} r/min; the envelope allows {most * RPM:.0f} r/min"
     if min(speeds) <= 2 * landing or len(set(speeds)) < len(speeds):
@@ -33,12 +40,32 @@ def of_speeds(rig: RigFile, speeds: Sequence[float]) -> Iterator[str]:
 
 def of_slow_roll(rig: RigFile, rad_s: float, seconds: float, speeds: Sequence[float]) -> Iterator[str]:
     """A slow roll at `rad_s` (0: none) that is none beside the speeds in rad/s, or too short."""
-    most = too_fast(speeds, conventions(rig))
-    if 0 < rad_s < 15 or rad_s > most:
-        yield (f"slow_rad_s: found {rad_s * RPM:.0f} r/min; expected 0, or 143 (two turns a second and some more) to "
-               f"{most * RPM:.0f} r/min: faster, unbalance moves the shaft")  # fmt: skip
+    machine = conventions(rig)
+    most = too_fast(speeds, machine)
+    if rad_s and most < SLOWEST:
+        yield _no_slow_roll(rad_s, speeds, machine, needed=not has_model(rig))
+        return
+    if 0 < rad_s < SLOWEST or rad_s > most:
+        yield (f"slow_rad_s: found {rad_s * RPM:.0f} r/min; expected 0, or {SLOWEST * RPM:.0f} (two turns a second and some "
+               f"more) to {most * RPM:.0f} r/min: faster, unbalance moves the shaft")  # fmt: skip
     if rad_s and rad_s * seconds < 2 * math.pi * TURNS:
         yield f"slow_s: found {seconds:g} s; expected {TURNS} turns at {rad_s * RPM:.0f} r/min or more"
+
+
+def _no_slow_roll(rad_s: float, speeds: Sequence[float], machine: AmbRotor, *, needed: bool) -> str:
+    """Which two limits leave no speed for a slow roll, and the way out."""
+    lowest, loop = min(speeds), machine.loop_rad_s
+    if loop < lowest:
+        upper = f"the loop's own {loop * RPM:.0f} r/min, by the gains of its laws"
+        ways = ["stiffer gains (defaults of the parameters under capabilities.flatness)"]
+    else:
+        upper = f"the lowest of speeds_rad_s, {lowest * RPM:.0f} r/min"
+        ways = [f"speeds_rad_s from {SLOWEST / SLOW_MOST * RPM:.0f} r/min on"]
+    ways.append("the bearings' force constants (capabilities.model, or an adopted bearing-model) and slow_rad_s = 0"
+                if needed else "slow_rad_s = 0: none, and the runout stays in the vectors")  # fmt: skip
+    return (f"slow_rad_s: found {rad_s * RPM:.0f} r/min; no slow roll fits: it takes {SLOWEST * RPM:.0f} r/min or more (two "
+            f"turns a second and some more), and no more than {SLOW_MOST * min(lowest, loop) * RPM:.0f} r/min, {SLOW_MOST:.0%} "
+            f"of {upper}. Expected {', or '.join(ways)}")  # fmt: skip
 
 
 def of_captures(

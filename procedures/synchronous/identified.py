@@ -102,7 +102,11 @@ def _guessed(s: Stand, readings: Sequence[Reading]) -> Array:
         if (beta > 0).all() and (best is None or left < best[0]):
             best = (left, beta)
     if best is None:
-        raise AnalysisError("the dwells do not tell the bearings' force constants: motion and currents fit no magnet")
+        raise AnalysisError(
+            "the dwells do not tell the bearings' force constants: motion and currents fit no magnet. Give them: in the "
+            "controller (capabilities.model) or by an adopted bearing-model; or take more speeds_rad_s, further apart, beside "
+            "the slow roll"
+        )
     return best[1]
 
 

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from bench.errors import AnalysisError
 from bench.recording import Step
-from procedures.amb_rotor.conventions import AmbRotor
+from procedures.amb_rotor.machine import AmbRotor
 from procedures.amb_rotor.onset import onset
 
 Array = npt.NDArray[np.float64]
@@ -27,7 +27,6 @@ FINE = 2000  # points of the ellipse that are looked at
 LARGE = 0.5  # of the greatest step: those whose answers are looked at
 RESTS = 4  # samples before a step that it is counted from
 REACH_S = 6e-3  # after a step
-READ_S = 2e-3  # the same of single readings: those of many steps lie close together, and the rate soon turns the answer round
 
 
 @dataclass(frozen=True)
@@ -82,9 +81,8 @@ def delay(
     if not at:
         raise AnalysisError("found no samples about the steps of the reference; expected some about each")
     when, what = np.concatenate(at), np.concatenate(answers)
-    window = READ_S if ticks == 1 else None
     return onset(
-        when, what, 0.0, 2 * period, tick=tick, ticks=ticks, lag_s=machine.lag_s, window_s=window, period_s=period_s
+        when, what, 0.0, 2 * period, tick=tick, ticks=ticks, lag_s=machine.lag_s, period_s=period_s, answers=len(at)
     )
 
 

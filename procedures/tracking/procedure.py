@@ -24,9 +24,10 @@ from bench.rigfile.capabilities import Path
 from bench.uncertainty import Estimate
 from bench.units import RPM
 from procedures.amb_rotor import frame, lift, pushes, wiring
-from procedures.amb_rotor.conventions import Law, conventions
+from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.geometry import nominal
 from procedures.amb_rotor.laws import of_laws
+from procedures.amb_rotor.machine import Law
 from procedures.shared import first_look
 from procedures.tracking import by_points, checks, estimates
 from procedures.tracking import figures as drawn

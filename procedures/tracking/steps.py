@@ -13,8 +13,9 @@ from bench.errors import AnalysisError
 from bench.recording import Recording, Step
 from bench.rigfile import RigFile
 from bench.rigfile.roles import SPEED, STATUS
-from procedures.amb_rotor.conventions import AmbRotor, conventions
+from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.geometry import Facts, left
+from procedures.amb_rotor.machine import AmbRotor
 from procedures.amb_rotor.onset import onset, pushing
 from procedures.shared.sampled import of_telemetry
 from procedures.tracking.ellipse import Path, Wave

@@ -5,8 +5,9 @@ from __future__ import annotations
 from bench.procedure.rig import Rig
 from bench.recording.recorder import Recorder
 from procedures.amb_rotor import lift
-from procedures.amb_rotor.conventions import Variant, conventions
+from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.lift import write
+from procedures.amb_rotor.machine import Variant
 from procedures.shared.rates import rate_of
 from procedures.synchronous.dwelling import roll_slowly, step_labels
 from procedures.synchronous.dwells import DWELL, can_capture, captured_channels

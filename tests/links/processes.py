@@ -110,7 +110,7 @@ class Served:
 def kind_of(url: str) -> str:
     """`slcan:socket`, `slcan:pty`, `serial:socket`, `serial:pty`, `line`, `modbus-tcp` ... of an endpoint."""
     scheme, _, rest = url.partition(":")
-    if scheme in ("slcan", "serial", "modbus-rtu"):
+    if scheme in ("slcan", "serial", "cli", "modbus-rtu"):
         return f"{scheme}:{'socket' if rest.startswith('socket://') else 'pty'}"
     return scheme
 

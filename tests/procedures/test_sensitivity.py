@@ -193,7 +193,7 @@ def test_plans_that_cannot_work_are_refused() -> None:
     assert why() == ""
     assert why(law="CCS", speeds_rad_s=(0.0, 14000 / RPM)) == ""
     assert (
-        "amplitude_A: found 0.05 A for each line; expected less: injection: found a peak of 0.88 A; the envelope allows"
+        "amplitude_A: found 0.05 A for each of 128 lines; expected less: injection: found a peak of 0.88 A; the envelope allows"
         in why(amplitude_A=0.05)
     )
     assert "folds back" in why(rate_hz=2000.0)
@@ -205,6 +205,29 @@ def test_plans_that_cannot_work_are_refused() -> None:
     assert "found none" in "; ".join(procedure.problems(rig.model_copy(update={"capture": None}), Plan()))
     bare = rig.model_copy(update={"devices": {k: d for k, d in rig.devices.items() if k != "drive"}})
     assert "nothing turns" in next(iter(check(bare, Plan(speeds_rad_s=(0.0, 1000.0)))))
+
+
+def test_a_refused_injection_names_what_asks_for_it() -> None:
+    """A line beyond its parameter's range is not the amplitude's fault, nor is an envelope that allows no injection."""
+    rig = load_rig("amb5dof")
+
+    def why(changed: Any) -> str:
+        return "; ".join(check(changed, Plan(**rig.plans["sensitivity"])))
+
+    def narrowed(name: str, **to: float) -> Any:
+        found = rig.parameters[name].model_copy(update=to)
+        return rig.model_copy(update={"parameters": {**rig.parameters, name: found}})
+
+    lines = why(narrowed("inject_lines", high=64.0))
+    assert lines.startswith("capabilities.injection.lines: found 128 lines at once: parameter inject_lines: ")
+    assert "range in the rig file" in lines
+    assert "amplitude" not in lines
+    assert why(narrowed("inject_step", high=3.0)).startswith("low_hz, high_step_hz, scan_step_hz: found ")
+    assert why(narrowed("inject_hz", high=300.0)).startswith("low_hz, high_hz: found lines from ")
+    none = rig.model_copy(update={"envelope": rig.envelope.model_copy(update={"max_injection_A": 0.0})})
+    assert why(none).startswith(
+        "envelope.max_injection_A: found none; expected what may be added to a current reference, A: "
+    )
 
 
 def test_no_injection_leaves_the_envelope() -> None:

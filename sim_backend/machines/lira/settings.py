@@ -61,6 +61,8 @@ SETTINGS: Final = (
     Setting("gate.time", "gate_s", "s", 0, 5),
     Setting("z.off", "z_off", "m", 0, 5e-3),
     Setting("v.land", "v_land", "m/s", 0, 0.1),
+    Setting("watchdog_s", "watchdog_s", "s", 0.02, 10),
+    Setting("u.dc", "supply_V", "V", 48, 450),
 )
 BY_NAME: Final = {s.name: s for s in SETTINGS}
 AXES_OF_LINE: Final = {"x1": "x1", "x2": "x2", "y1": "y1", "y2": "y2", "z": "z", "gamma": "angle"}

@@ -1,0 +1,83 @@
+"""A command line over real ports: a served rig as a process of its own, on a pty and over TCP, with a good and a bad line."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import processes
+import pytest
+
+from bench.cli.opening import LIVE_SLICE_S, beat_of
+from bench.clock import WallClock
+from bench.link.session import new_session
+from bench.rigfile import RigFile, load_rig
+from drivers.controller import Controller
+from drivers.live_link import LiveLink
+from drivers.wires import open_wire
+
+PORTS = ("--link", "controller=cli:socket://127.0.0.1:0", "--link", "operator=line:127.0.0.1:0")
+KINDS = ("cli:socket", "cli:pty")
+WIRE_S = 52 * 2 * 17_500 * 10 / 3e6  # of half a second of 52 channels at 35 kHz, at 3 MBd
+FAULTS = ("--fault", "corrupt=0.01", "--fault", "drop=0.01")
+
+
+@contextmanager
+def connected(folder: Path, url: str) -> Iterator[Controller]:
+    text = (folder / "rigs/lira.toml").read_text()
+    rig = RigFile.parse(re.sub(r'url = "cli:.*"', f'url = "{url}"', text), load_rig("lira").dbc_text)
+    wall, session = WallClock(), new_session()
+    link = LiveLink(
+        "controller", lambda: open_wire(rig.link, "controller", (), wall.now_ns, rig), beat_of(rig, session)
+    )
+    with contextlib.closing(link):
+        controller = Controller(rig, link, wall, session, LIVE_SLICE_S)
+        controller.connect()
+        yield controller
+
+
+@pytest.mark.timeout(240)
+@pytest.mark.parametrize("faults", [(), FAULTS], ids=["good", "bad"])
+def test_half_a_second_of_every_measurement_comes_whole(tmp_path: Path, faults: tuple[str, ...]) -> None:
+    """Every sample is there, whatever the line did to its blocks."""
+    with processes.served(tmp_path, "--seed", "1", "--truth", "reduced=1", *faults, rig="lira", ports=PORTS) as rig:
+        for kind in KINDS:
+            with connected(tmp_path, rig.endpoints[kind]) as controller:
+                controller.enable()
+                controller.levitate()
+                capture = controller.capture
+                assert capture is not None
+                capture.arm(capture.channels[:52], seconds=0.5, rate_hz=35_000)
+                capture.wait(60.0)
+                begun = time.monotonic()
+                data = capture.upload()
+                took = time.monotonic() - begun
+                sys.stderr.write(f"{kind} {' '.join(faults)}: {took:.2f} s; the wire alone takes {WIRE_S:.2f} s\n")
+                controller.land()
+                controller.disable()
+            assert len(data.columns) == 52
+            assert {len(x) for x in data.columns.values()} == {17_500}
+            assert np.ptp(data.columns["z"]) < 1e-4
+
+
+@pytest.mark.timeout(120)
+def test_a_host_that_dies_is_landed(tmp_path: Path) -> None:
+    """Within 100 ms of the last heartbeat by the device's own ticks; the served firmware tells when."""
+    with (
+        processes.served(tmp_path, "--truth", "reduced=1", rig="lira", patience_s=None, ports=PORTS) as rig,
+        processes.bench(
+            tmp_path, *processes.live(rig, "cli:socket", "tiny-levitated", "--plan", "act=count", name="lira")
+        ) as host,
+    ):
+        rig.child.wait_for("LEVITATED")
+        host.process.send_signal(signal.SIGKILL)
+        line = rig.child.wait_for("LANDING")
+        assert "HEARTBEAT_LOST" in line
+        rig.child.wait_for("-> FAULT")
