@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import os
 import re
 import signal
 import subprocess
@@ -12,12 +14,28 @@ from typing import Any
 
 import numpy as np
 import pytest
-from line_programs import KINDS, NOISE_A, PLACES, TICKS_S, Controller, controller, law, opened, rise_time
+from line_programs import (
+    KINDS,
+    NOISE_A,
+    PATIENT_MS,
+    PLACES,
+    ROOT,
+    TICKS_S,
+    Controller,
+    controller,
+    law,
+    opened,
+    rise_time,
+)
 
 from bench.errors import BenchError, LinkError
 from bench.rigfile.capture import rises
 
 STEP_A = 5.0
+PATHS = os.pathsep.join((str(Path(__file__).parent), str(ROOT)))
+ENVIRONMENT = {**os.environ, "PYTHONPATH": PATHS}
+MACHINE = {"telemetry-late", "heartbeat-late", "heartbeat-unprioritised", "clock-unknown"}
+"""Findings about the machine that the test runs on."""
 SIXTEEN = ("i_q_R1", "i_d_R1", "i_q_R2", "u_dc", "z",
            *(f"i_s{k}" for k in range(1, 7)), *(f"i_f{k}" for k in range(1, 6)))  # fmt: skip
 HOLDING = """
@@ -50,7 +68,7 @@ def crossing(y: np.ndarray[Any, Any], level: float) -> float:
 
 
 def test_a_run(line_program: Path, rig_folder: Path, kind: str, place: str) -> None:
-    with controller(line_program, place, kind) as there, opened(rig_folder, kind, there.url) as rig:
+    with controller(line_program, place, kind, PATIENT_MS) as there, opened(rig_folder, kind, there.url) as rig:
         c = rig.levitation
         c.enable()
         assert c.mode == "READY"
@@ -77,7 +95,7 @@ def test_a_run(line_program: Path, rig_folder: Path, kind: str, place: str) -> N
 
 def test_a_step_of_a_current(line_program: Path, rig_folder: Path, kind: str, place: str) -> None:
     """16 channels at 280 kHz about the step: the law in closed form, sample by sample, and its rise time."""
-    with controller(line_program, place, kind) as there, opened(rig_folder, kind, there.url) as rig:
+    with controller(line_program, place, kind, PATIENT_MS) as there, opened(rig_folder, kind, there.url) as rig:
         rig.levitation.enable()
         assert rig.capture is not None
         rig.capture.arm(SIXTEEN, seconds=0.02, before_s=0.005, trigger=rises("i_q_R1", STEP_A / 2))
@@ -109,7 +127,7 @@ def test_a_step_of_a_current(line_program: Path, rig_folder: Path, kind: str, pl
 
 def test_everything_at_once(line_program: Path, rig_folder: Path, kind: str) -> None:
     """All 62 channels at 35 kHz while telemetry goes on."""
-    with controller(line_program, "tcp", kind) as there, opened(rig_folder, kind, there.url) as rig:
+    with controller(line_program, "tcp", kind, PATIENT_MS) as there, opened(rig_folder, kind, there.url) as rig:
         assert rig.capture is not None
         rig.capture.arm(rig.capture.channels, seconds=0.2, rate_hz=35_000)
         rig.capture.wait(5.0)
@@ -129,7 +147,7 @@ def killed_under_the_bench(there: Controller, rig_folder: Path) -> None:
 
 
 def test_a_killed_controller_is_noticed(line_program: Path, rig_folder: Path, place: str) -> None:
-    with controller(line_program, place) as there:
+    with controller(line_program, place, watchdog_ms=PATIENT_MS) as there:
         said = rf"port {re.escape(there.where)} was unplugged or its other end closed"
         with pytest.raises(LinkError, match=said):
             killed_under_the_bench(there, rig_folder)
@@ -138,18 +156,77 @@ def test_a_killed_controller_is_noticed(line_program: Path, rig_folder: Path, pl
 def test_a_killed_bench_leaves_a_controller_that_lands(
     line_program: Path, rig_folder: Path, kind: str, place: str
 ) -> None:
-    with controller(line_program, place, kind) as there:
-        words = (str(Path(__file__).parent), str(rig_folder), kind, there.url)
-        with subprocess.Popen([sys.executable, "-c", HOLDING, *words], stdout=subprocess.PIPE, text=True) as bench:
-            assert bench.stdout
-            assert bench.stdout.readline().strip() == "held"
-            bench.send_signal(signal.SIGKILL)
-            killed = time.monotonic()
+    """A machine so busy that a bench misses 80 ms before it is killed is none to tell by: again, with another program."""
+    for _ in range(5):
+        with controller(line_program, place, kind) as there:
+            words = (str(Path(__file__).parent), str(rig_folder), kind, there.url)
+            with subprocess.Popen([sys.executable, "-c", HOLDING, *words], stdout=subprocess.PIPE, text=True) as bench:
+                assert bench.stdout
+                held = bench.stdout.readline().strip()
+                bench.send_signal(signal.SIGKILL)
+                killed = time.monotonic()
             _, beat, _, lost, state = there.said().split()
             after = time.monotonic() - killed
-        landed = there.said().split()
+            landed = there.said().split()
+        if held == "held":
+            break
     assert state == "LEVITATED"
     assert 0.08 <= (int(lost) - int(beat)) / TICKS_S <= 0.1
     assert after < 0.5  # by this machine's clock, as busy as it is: no process of the bench goes on
     assert landed[0::2] == ["landed", "FAULT"]
     assert 0.3 <= (int(landed[1]) - int(lost)) / TICKS_S < 0.31
+
+
+def test_a_streaming_controller_is_listened_to(line_program: Path, rig_folder: Path, kind: str) -> None:
+    """It goes on when its bench has gone; who listens says nothing."""
+    with controller(line_program, "tcp", kind) as there:
+        with opened(rig_folder, kind, there.url) as rig:
+            assert rig.levitation.mode == "OFF"
+        words = ("listen", kind, "--seconds", "2", "--link", f"controller={there.url}")
+        done = bench(rig_folder, *words)
+    assert done.returncode == 0
+    assert re.search(r"samples +\d{3,4} at 500/s, by the DBC 500/s; lost 0 in 0 gaps", done.stdout)
+
+
+def bench(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    """`bench` with the procedure `line-look` in its catalogue."""
+    return subprocess.run(
+        [sys.executable, "-m", "line_catalogue", *words], cwd=folder, env=ENVIRONMENT, stdin=subprocess.DEVNULL,
+        capture_output=True, text=True, timeout=60,
+    )  # fmt: skip
+
+
+def run(kind: str, url: str, seconds: float) -> tuple[str, ...]:
+    given = ("run", "line-look", "--rig", kind, "--backend", "live", "--operator", "console", "--no-report")
+    return (*given, "--link", f"controller={url}", "--plan", f"seconds={seconds}")
+
+
+def test_a_whole_run(line_program: Path, rig_folder: Path, kind: str, place: str) -> None:
+    with controller(line_program, place, kind, PATIENT_MS) as there:
+        done = bench(rig_folder, *run(kind, there.url, 0.5))
+    assert done.returncode == 0, done.stderr
+    record = json.loads((rig_folder / done.stdout.strip() / "record.json").read_text())
+    assert record["outcome"] == "DONE"
+    assert {f["code"] for f in record["findings"]} <= MACHINE
+
+
+def test_a_controller_killed_in_a_run(line_program: Path, rig_folder: Path, kind: str) -> None:
+    """The link's loss, and that nobody knows where the mover is, stand in the record; the bench ends by itself."""
+    with controller(line_program, "tcp", kind, PATIENT_MS) as there:
+        words = [sys.executable, "-m", "line_catalogue", *run(kind, there.url, 30)]
+        with subprocess.Popen(
+            words, cwd=rig_folder, env=ENVIRONMENT, text=True, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+        ) as child:  # fmt: skip
+            assert child.stderr
+            while child.stderr.readline() != "held\n":
+                assert child.poll() is None
+            there.process.kill()
+            out, told = child.communicate(timeout=60)
+    assert child.returncode == 3
+    record = json.loads((rig_folder / out.strip() / "record.json").read_text())
+    assert record["outcome"] == "ERROR"
+    codes = [f["code"] for f in record["findings"]]
+    assert codes[0] == "link-lost"
+    assert "make-safe-failed" in codes
+    assert "was unplugged or its other end closed" in told

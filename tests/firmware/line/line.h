@@ -15,7 +15,7 @@ enum { UNKNOWN_VERB = 1, ARGUMENTS, RANGE, STATE, BUSY, CHECKSUM, TOO_LONG, NOT_
 
 /* plant.c: currents, positions, states, all by ticks */
 struct move { double now, goal, rate; };
-extern uint64_t tick;
+extern uint64_t tick, watchdog; /* ticks; the second: without a heartbeat */
 extern enum state state;
 extern int fault; /* as telemetry has it: 0 none, 4 HEARTBEAT_LOST */
 extern double step_of[CURRENTS];  /* A, added to each current's reference */

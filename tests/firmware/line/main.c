@@ -1,5 +1,5 @@
-/* line [--dialect] pty | tcp PORT: the controller on a pseudo terminal or a socket. It prints where it listens, and each landing of
-   its watchdog; it ends with its standard input. */
+/* line [--dialect] [--watchdog MS] pty | tcp PORT: the controller on a pseudo terminal or a socket. It prints where it listens, and
+   each landing of its watchdog; it ends with its standard input. */
 #define _XOPEN_SOURCE 600
 #include "line.h"
 #include <arpa/inet.h>
@@ -119,6 +119,10 @@ int main(int count, char **word)
     char ignored[64];
     signal(SIGPIPE, SIG_IGN);
     dialect = at < count && !strcmp(word[at], "--dialect") ? at++ : 0;
+    if (at + 1 < count && !strcmp(word[at], "--watchdog")) {
+        watchdog = (uint64_t)atoi(word[at + 1]) * TICKS / 1000;
+        at += 2;
+    }
     table_start();
     plant_start();
     if (at + 2 == count && !strcmp(word[at], "tcp")) open_tcp(atoi(word[at + 1]));

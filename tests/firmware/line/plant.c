@@ -8,7 +8,6 @@
 #define NOISE 5e-3     /* A, standard deviation */
 #define TIMED (3 * TICKS / 10) /* a lift and a landing */
 #define HEARTBEAT_LOST 4
-#define WATCHDOG (TICKS * 80 / 1000)
 #define LIFTED 8e-3 /* m */
 #define RESTING -25e-6
 #define SUPPLY 400.0
@@ -16,7 +15,7 @@
 const char *const state_names[7] = {"OFF", "IDLE", "CURRENT", "LIFT", "LEVITATED", "LANDING", "FAULT"};
 const char *const axis_names[6] = {"x1", "x2", "y1", "y2", "z", "gamma"};
 const char *const fault_names[5] = {"NONE", "LEVITATION_LOST", "OVERCURRENT", "SUPPLY", "HEARTBEAT_LOST"};
-uint64_t tick;
+uint64_t tick, watchdog = TICKS * 80 / 1000;
 int fault;
 enum state state = OFF;
 double step_of[CURRENTS];
@@ -86,7 +85,7 @@ uint64_t heartbeat_age(void) { return state < CURRENT || state == FAULT ? UINT64
 
 static void watch(void)
 {
-    if (state < CURRENT || state == FAULT || fault || heartbeat_age() < WATCHDOG) return;
+    if (state < CURRENT || state == FAULT || fault || heartbeat_age() < watchdog) return;
     fault = HEARTBEAT_LOST;
     tell("heartbeat %llu lost %llu %s", (unsigned long long)heartbeat, (unsigned long long)tick, state_names[state]);
     event("fault %s", fault_names[fault]);
