@@ -69,6 +69,24 @@ class Holding(Part):
     derivative_on_error: str = ""
 
 
+class Motion(Part):
+    """A mover that is sent along and around: parameters of its set points, `place` m and `angle` rad, and of what a move goes
+    by, `*_rate` m/s, rad/s and `*_rise` m/s^2, rad/s^2; channels that show both, and `currents` of the bearings among those of
+    a capture. `gate` m and `gate_time` s: it counts as lifted when every radial probe has read less for so long."""
+
+    place: str
+    place_rate: str = ""
+    place_rise: str = ""
+    place_channel: str
+    angle: str
+    angle_rate: str = ""
+    angle_rise: str = ""
+    angle_channel: str
+    gate: str = ""
+    gate_time: str = ""
+    currents: tuple[str, ...] = ()
+
+
 class Gains(Part):
     """Of the PID that holds each axis: a parameter of all axes, or one by bearing axis. A/m, A/(m s), A s/m."""
 
@@ -148,6 +166,7 @@ class Capabilities(Part):
     bias: Mapping[Name, str] = {}
     settings: Mapping[Name, Mapping[Name, Mapping[str, float]]] = {}
     angle: Holding | None = None
+    motion: Motion | None = None
     motor: MotorForce = MotorForce()
     gains: Gains = Gains()
     flatness: Mapping[Name, Flatness] = {}
@@ -169,6 +188,10 @@ class Capabilities(Part):
         told = {"value": value, "unit": "s", "half_width": abs(value) / 10, "distribution": "rectangular",
                 "source": "capabilities.loop_delay_s, which states no tolerance: a tenth of it"}  # fmt: skip
         return {**{key: of for key, of in data.items() if key != "loop_delay_s"}, "loop_delay": told}
+
+
+MOVED = ("place", "place_rate", "place_rise", "angle", "angle_rate", "angle_rise", "gate", "gate_time")
+"""Keys of a motion that are parameters."""
 
 
 def parameters_named(c: Capabilities) -> Iterator[tuple[str, str]]:
@@ -194,6 +217,8 @@ def _tables(c: Capabilities) -> Iterator[tuple[str, str | Mapping[str, str]]]:
             yield f"settings.{kind}.{name}", {parameter: parameter for parameter in values}
     if angle is not None:
         yield from ((f"angle.{key}", value) for key, value in angle)
+    if c.motion is not None:
+        yield from ((f"motion.{key}", getattr(c.motion, key)) for key in MOVED)
     yield from ((f"motor.{key}", value) for key, value in c.motor)
     yield from ((f"gains.{key}", value) for key, value in c.gains)
     for law, flat in c.flatness.items():

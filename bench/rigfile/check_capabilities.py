@@ -20,6 +20,7 @@ def problems_of(rig: RigFile) -> Iterator[Problem]:
         *_parameters(rig),
         *_names(rig),
         *_values(rig),
+        *_motion(rig),
         *_status(rig),
         *_units(rig),
         *_delay(rig),
@@ -31,6 +32,8 @@ Line = tuple[str, str, str]
 KINDS = {"set_points.axes": "m", "set_points.slew": "m/s", "set_points.slew_tilt": "rad/s", "path.y": "m", "path.z": "m",
          "path.hz": "Hz", "path.phase": "rad", "path.ramp_s": "s", "injection.amplitude": "A", "injection.hz": "Hz",
          "injection.step": "Hz", "bias": "A", "angle.ref": "rad", "angle.slew": "rad/s", "angle.speed": "rad/s",
+         "motion.place": "m", "motion.place_rate": "m/s", "motion.place_rise": "m/s^2", "motion.angle": "rad",
+         "motion.angle_rate": "rad/s", "motion.angle_rise": "rad/s^2", "motion.gate": "m", "motion.gate_time": "s",
          "motor.phase_slew": "rad/s", "motor.phase_limit": "rad", "motor.circle": "m", "motor.circle_hz": "Hz",
          "current_limit": "A", "landing_speed": "rad/s", "lift_time": "s", "watchdog": "s"}  # fmt: skip
 COORDINATES = {"x": "m", "y": "m", "z": "m", "psi": "rad", "theta": "rad"}
@@ -75,6 +78,25 @@ def _names(rig: RigFile) -> Iterator[Line]:
             if name not in known:
                 what = "an axis" if known is axes else "a bearing" if known is rig.bearings else "a ring"
                 yield f"{key}.{name}", name, f"{what} of this file: {', '.join(known) or '(there is none)'}"
+
+
+def _motion(rig: RigFile) -> Iterator[Line]:
+    """Channels that show where the mover is, and what its bearings carry."""
+    motion = rig.capabilities.motion
+    if motion is None:
+        return
+    captured = {} if rig.capture is None else rig.capture.channels
+    for key, name, si in (
+        ("place_channel", motion.place_channel, "m"),
+        ("angle_channel", motion.angle_channel, "rad"),
+    ):
+        if name not in rig.channels:
+            yield f"motion.{key}", repr(name), f"a channel of this file{near(name, rig.channels)}"
+        elif units.UNITS.get(unit := rig.channels[name].unit, units.UNITS["1"]).si != si:
+            yield f"motion.{key}", f"{name}, in {unit}", f"a channel in {si}"
+    for name in motion.currents:
+        if name not in captured:
+            yield "motion.currents", repr(name), f"a channel of [capture.channels]{near(name, captured)}"
 
 
 def _stops(rig: RigFile) -> tuple[str, ...]:

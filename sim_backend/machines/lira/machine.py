@@ -16,6 +16,8 @@ from sim_backend.machines.lira.operator import Attendant
 from sim_backend.machines.lira.params import COILS, ControlParams, Each, PlantParams
 from sim_backend.machines.lira.plant import DQ, TICKS_S, Plant
 from sim_backend.machines.lira.settings import BY_NAME
+from sim_backend.machines.lira.truth_mission import mission
+from sim_backend.motion import Motions
 
 HALVES: Final = range(1, COILS + 1)
 """Coils and half-bridges by their numbers: coil k is driven by half-bridge k."""
@@ -29,6 +31,10 @@ EACH: Final = {
 """Numbers that the rig file states once and each coil or half-bridge has of its own: what their draws' names end in."""
 EXCHANGED: Final = ((1, 5), (2, 4))
 """Places among six half-bridges of phases b and c of both systems."""
+SENT: Final = frozenset(f"ref_{name}" for name in (*RADIAL, "z", "gamma")) | frozenset(
+    f"{what}_{name}" for what in ("rate", "accel") for name in ("z", "gamma")
+)
+"""Set points and what a move goes by, which the command line hears with verbs of their own."""
 DEFECTS = {
     "drop_fraction": 0.0, "dead_after_s": 0.0, "fault_after_s": 0.0, "drive_fault_after_s": 0.0, "integrator_factor": 1.0,
     "coil_reversed": 0.0, "exchange_phases": 0.0, "exchange_actuators": 0.0, "zero_off_ra": 0.0, "zero_off_la": 0.0,
@@ -247,9 +253,10 @@ LIRA = Machine(
     copper_W=copper_W,
     operator=operator,
     daily=DAILY,
-    controls=frozenset(BY_NAME),
+    controls=frozenset(BY_NAME) | SENT,
     tick_s=1 / TICKS_S,
     period_s=PERIOD_S,
+    motions=Motions(mission=mission),
     controller=SpokenController,
     served=LineController,
 )
