@@ -30,7 +30,9 @@ _log = logging.getLogger("bench.commandline")
 class Counts:
     """What went wrong on the line, or was told beside."""
 
-    dropped: int = 0  # lines that are neither reply nor event, nor a prompt, text of its start or an echo of the opening
+    dropped: int = (
+        0  # lines that are neither reply nor event, nor a prompt, text of its start or an echo of the opening
+    )
     late: int = 0  # replies that nobody waited for
     damaged: int = 0  # blocks whose CRC is not theirs, or that cannot be a message
     events: int = 0
