@@ -61,6 +61,13 @@ def place(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
 
+REST = [("lira", "pty"), ("north", "tcp")]
+each_on_one = pytest.mark.parametrize(
+    ("kind", "place"), [("lira", "tcp"), ("north", "pty"), *(pytest.param(*x, marks=pytest.mark.long) for x in REST)]
+)
+"""Both dialects and both kinds of link, all four of them in the long run only."""
+
+
 def crossing(y: np.ndarray[Any, Any], level: float) -> float:
     """Samples from the first to where the level is first reached, between two on a straight line."""
     k = int(np.argmax(y >= level))
@@ -93,6 +100,7 @@ def test_a_run(line_program: Path, rig_folder: Path, kind: str, place: str) -> N
     assert health.stats.crc_errors == 0
 
 
+@each_on_one
 def test_a_step_of_a_current(line_program: Path, rig_folder: Path, kind: str, place: str) -> None:
     """16 channels at 280 kHz about the step: the law in closed form, sample by sample, and its rise time."""
     with controller(line_program, place, kind, PATIENT_MS) as there, opened(rig_folder, kind, there.url) as rig:
@@ -153,6 +161,7 @@ def test_a_killed_controller_is_noticed(line_program: Path, rig_folder: Path, pl
             killed_under_the_bench(there, rig_folder)
 
 
+@each_on_one
 def test_a_killed_bench_leaves_a_controller_that_lands(
     line_program: Path, rig_folder: Path, kind: str, place: str
 ) -> None:
@@ -201,6 +210,7 @@ def run(kind: str, url: str, seconds: float) -> tuple[str, ...]:
     return (*given, "--link", f"controller={url}", "--plan", f"seconds={seconds}")
 
 
+@each_on_one
 def test_a_whole_run(line_program: Path, rig_folder: Path, kind: str, place: str) -> None:
     with controller(line_program, place, kind, PATIENT_MS) as there:
         done = bench(rig_folder, *run(kind, there.url, 0.5))
