@@ -185,6 +185,20 @@ class MissionAsked:
 
 
 @dataclass(frozen=True)
+class CurrentAsked:
+    """Steps of currents that the controller regulates, of the machine at rest: by place the current, as the machine calls it,
+    and the proportional gain of its loop, V/A; the `size` of a large step and of a `small` one, A; what of the response counts,
+    s; the `angle` at which the mover was held, rad: it creeps before, and a limit of the half-bridges goes with it."""
+
+    steps: Mapping[str, str]
+    gains: Mapping[str, float]
+    size: float
+    small: float
+    response_s: float
+    angle: float = 0.0
+
+
+@dataclass(frozen=True)
 class Motions:
     """The truths of motion of one machine; None: it has none of that kind. Each takes the rig and what was drawn for it (a
     `Truth`) first.
@@ -203,6 +217,7 @@ class Motions:
         angle: what steps of the angle show, by quantity and case.
         drag: what stops the shaft that coasts, by the names of a spindown: B and B_high N m s/rad, T_c N m, J_z kg m^2.
         mission: largest readings, levels, errors at rest and times of a mission, by quantity and place.
+        currents: what stepped currents do, by quantity and place.
         speeds: at the torque limit, by sharing: `speed` rad/s, `bound` A of the torque current, `ripple` rad/s.
     """
 
@@ -220,6 +235,7 @@ class Motions:
     band: Callable[[RigFile, Any, BandAsked], Mapping[tuple[str, float | None], float]] | None = None
     speeds: Callable[[RigFile, Any, SpeedsAsked], Mapping[str, Mapping[str, float]]] | None = None
     mission: Callable[[RigFile, Any, MissionAsked], Mapping[tuple[str, str], float]] | None = None
+    currents: Callable[[RigFile, Any, CurrentAsked], Mapping[tuple[str, str], float]] | None = None
 
 
 NONE = Motions()

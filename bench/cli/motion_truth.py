@@ -233,6 +233,24 @@ def _derivative(done: Simulated) -> Found:
         yield name, "" if hz is None else f"{hz:g} Hz", value
 
 
+def _currents(done: Simulated) -> Found:
+    from procedures.current_step.steps import LARGE
+    from sim_backend.motion import CurrentAsked
+
+    plan: Any = done.recording.plan
+    rig, currents = done.recording.rig, done.drawn.machine.motions.currents
+    if currents is None:
+        return
+    stepped = {name: rig.capabilities.current_steps[name] for name in plan.steps_at}
+    steps = {name: step.parameter.removeprefix("step_") for name, step in stepped.items()}
+    gains = {name: rig.parameters[step.gain].default for name, step in stepped.items() if step.gain}
+    encoder = next((e.channel for e in rig.encoders.values() if e.measures == "angle"), "")
+    angle = next(iter(done.recording.steps(LARGE))).mean(encoder) if encoder else 0.0
+    asked = CurrentAsked(steps, gains, plan.size_A, plan.small_A, plan.response_s, angle)
+    for (name, where), value in currents(rig, done.drawn, asked).items():
+        yield name, where, value
+
+
 def _compare(done: Simulated) -> Found:
     from procedures.one_axis.conventions import conventions
     from sim_backend.motion import CompareAsked
@@ -422,4 +440,5 @@ TRUTHS: Mapping[str, Callable[[Any], Found]] = {
     "load-balancing": _circle,
     "estimator-compare": _compare,
     "mission": _mission,
+    "current-step": _currents,
 }

@@ -153,6 +153,39 @@ class Status(Part):
     segment_limit: Bit | None = None
 
 
+class CurrentStep(Part):
+    """A current that the controller regulates and steps at once. `parameter`, A, is added to its reference; `along` is the
+    channel of a capture that reads that current, `across` the one beside it, which is to stay; `currents` and `voltages` those
+    of the half-bridges that carry it, before and behind their filters, of a symmetric winding; `supply` that of the DC link,
+    half of which a half-bridge can give. `still`: positions that such a step must leave where they are.
+
+    What the controller has of it: parameters `gain` V/A, the proportional one, and `current_limit` A, of `currents`; what the
+    machine's table states: `inductance` of the winding and `filter_inductance` of a half-bridge, H."""
+
+    parameter: str
+    along: str
+    across: str
+    voltages: tuple[str, ...] = ()
+    currents: tuple[str, ...] = ()
+    supply: str = ""
+    still: tuple[str, ...] = ()
+    gain: str = ""
+    current_limit: str = ""
+    inductance: str = ""
+    filter_inductance: str = ""
+
+    @property
+    def captured(self) -> tuple[str, ...]:
+        """The channels of a capture of a step at full rate."""
+        supply = (self.supply,) if self.supply else ()
+        return (self.along, self.across, *self.voltages, *self.currents, *supply)
+
+    @property
+    def stated(self) -> tuple[str, ...]:
+        """Numbers of `[machine]` that it names."""
+        return tuple(name for name in (self.inductance, self.filter_inductance) if name)
+
+
 class Capabilities(Part):
     """`bias` is by bearing; `settings` are by kind and name: the parameters that choose it; of kind "law" the first is what a
     lift and a stop go by, unless "lift" says more. `gains` are of the
@@ -171,6 +204,7 @@ class Capabilities(Part):
     gains: Gains = Gains()
     flatness: Mapping[Name, Flatness] = {}
     status: Status = Status()
+    current_steps: Mapping[Name, CurrentStep] = {}
     model: Mapping[Name, str] = {}
     landing_speed: str = ""
     lift_time: str = ""
@@ -192,6 +226,7 @@ class Capabilities(Part):
 
 MOVED = ("place", "place_rate", "place_rise", "angle", "angle_rate", "angle_rise", "gate", "gate_time")
 """Keys of a motion that are parameters."""
+STEP_PARAMETERS = ("parameter", "gain", "current_limit")
 
 
 def parameters_named(c: Capabilities) -> Iterator[tuple[str, str]]:
@@ -223,6 +258,8 @@ def _tables(c: Capabilities) -> Iterator[tuple[str, str | Mapping[str, str]]]:
     yield from ((f"gains.{key}", value) for key, value in c.gains)
     for law, flat in c.flatness.items():
         yield from ((f"flatness.{law}.{key}", value) for key, value in flat)
+    for place, step in c.current_steps.items():
+        yield f"current_steps.{place}", {k: v for k in STEP_PARAMETERS if (v := getattr(step, k))}
     yield "model", c.model
     for key in ("landing_speed", "lift_time", "watchdog", "current_limit"):
         yield key, getattr(c, key)

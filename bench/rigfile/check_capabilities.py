@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 
 from bench import units
 from bench.errors import Problem
 from bench.rigfile.capabilities import Bit, parameters_named
+from bench.rigfile.check_current_steps import near
+from bench.rigfile.check_current_steps import problems_of as problems_of_current_steps
 from bench.rigfile.model import RigFile
 
 CODES = ("state", "fault")
@@ -24,6 +25,7 @@ def problems_of(rig: RigFile) -> Iterator[Problem]:
         *_status(rig),
         *_units(rig),
         *_delay(rig),
+        *problems_of_current_steps(rig),
     ):
         yield Problem(rig.path, f"capabilities.{key}", found, expected)
 
@@ -154,9 +156,3 @@ def _status(rig: RigFile) -> Iterator[Line]:
             yield f"{key}.channel", f"{bit.channel}, in {rig.channels[bit.channel].unit}", "a channel of bits, in 1"
         if (first := taken.setdefault((bit.channel, bit.mask), key)) != key:
             yield key, f"{bit.channel}, mask {bit.mask}", f"a bit of its own: it is that of {first}"
-
-
-def near(name: str, known: Collection[str]) -> str:
-    """The nearest of the names that there are, for a message."""
-    close = difflib.get_close_matches(name, known, 1)
-    return f", such as {close[0]}" if close else ""

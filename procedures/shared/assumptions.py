@@ -135,3 +135,11 @@ MISSION = (
     "5 µm nearer to one side and changes no result.",
     "What happens while a capture is uploaded, the mover held where it is, is in no result.",
 )
+CURRENT_STEP = (
+    "Currents are as the controller's own sensors read them. One gain for all of them cancels in every quantity; gains that "
+    "differ by 0.5 % between two coils turn 0.1 % of the step across.",
+    "Time is the controller's: a clock that is fast by 1e-4 makes rise times shorter and bands wider by that share.",
+    "Phases that are exchanged alike in the winding and in the controller's count, or an encoder whose zero is off: at "
+    "standstill the currents are the same to the last digit. The order of the phases and the zeros are other tests'.",
+    "A coil of the linear winding that is reversed and stands where its current gives no force: it pushes nothing there.",
+)
