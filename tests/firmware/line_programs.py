@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+import os
 import queue
 import shutil
 import socket
 import subprocess
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -27,6 +29,9 @@ TICKS_S = 280_000
 PATIENT_MS = 5000
 NATURAL, ZETA, NOISE_A = 2 * math.pi * 4000, 0.6, 5e-3
 """Of each current's law, rad/s and 1; standard deviation of a reading."""
+ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join((str(Path(__file__).parent), str(ROOT)))}
+MACHINE = {"telemetry-late", "heartbeat-late", "heartbeat-unprioritised", "clock-unknown"}
+"""Findings about the machine that the test runs on."""
 KINDS = ("lira", "north")
 PLACES = ("tcp", "pty")
 
@@ -103,3 +108,12 @@ def opened(folder: Path, kind: str, url: str) -> Iterator[Rig]:
         rig = with_links(load_rig(str(folder / "rigs" / f"{kind}.toml")), links)
         with opening.live(rig, "auto")(Supervisor()) as there:
             yield there.rig
+
+
+def run_bench(folder: Path, *words: str, real: bool = False) -> subprocess.CompletedProcess[str]:
+    """`bench` with the procedure `line-look` in its catalogue, or as users have it, to its end."""
+    module = "bench.cli.__main__" if real else "line_catalogue"
+    return subprocess.run(
+        [sys.executable, "-m", module, *words], cwd=folder, env=ENVIRONMENT, stdin=subprocess.DEVNULL,
+        capture_output=True, text=True, timeout=100,
+    )  # fmt: skip

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import signal
 import subprocess
@@ -15,27 +14,25 @@ from typing import Any
 import numpy as np
 import pytest
 from line_programs import (
+    ENVIRONMENT,
     KINDS,
+    MACHINE,
     NOISE_A,
     PATIENT_MS,
     PLACES,
-    ROOT,
     TICKS_S,
     Controller,
     controller,
     law,
     opened,
     rise_time,
+    run_bench,
 )
 
 from bench.errors import BenchError, LinkError
 from bench.rigfile.capture import rises
 
 STEP_A = 5.0
-PATHS = os.pathsep.join((str(Path(__file__).parent), str(ROOT)))
-ENVIRONMENT = {**os.environ, "PYTHONPATH": PATHS}
-MACHINE = {"telemetry-late", "heartbeat-late", "heartbeat-unprioritised", "clock-unknown"}
-"""Findings about the machine that the test runs on."""
 SIXTEEN = ("i_q_R1", "i_d_R1", "i_q_R2", "u_dc", "z",
            *(f"i_s{k}" for k in range(1, 7)), *(f"i_f{k}" for k in range(1, 6)))  # fmt: skip
 HOLDING = """
@@ -192,17 +189,9 @@ def test_a_streaming_controller_is_listened_to(line_program: Path, rig_folder: P
         with opened(rig_folder, kind, there.url) as rig:
             assert rig.levitation.mode == "OFF"
         words = ("listen", kind, "--seconds", "2", "--link", f"controller={there.url}")
-        done = bench(rig_folder, *words)
+        done = run_bench(rig_folder, *words)
     assert done.returncode == 0
     assert re.search(r"samples +\d{3,4} at 500/s, by the DBC 500/s; lost 0 in 0 gaps", done.stdout)
-
-
-def bench(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    """`bench` with the procedure `line-look` in its catalogue."""
-    return subprocess.run(
-        [sys.executable, "-m", "line_catalogue", *words], cwd=folder, env=ENVIRONMENT, stdin=subprocess.DEVNULL,
-        capture_output=True, text=True, timeout=60,
-    )  # fmt: skip
 
 
 def run(kind: str, url: str, seconds: float) -> tuple[str, ...]:
@@ -213,7 +202,7 @@ def run(kind: str, url: str, seconds: float) -> tuple[str, ...]:
 @each_on_one
 def test_a_whole_run(line_program: Path, rig_folder: Path, kind: str, place: str) -> None:
     with controller(line_program, place, kind, PATIENT_MS) as there:
-        done = bench(rig_folder, *run(kind, there.url, 0.5))
+        done = run_bench(rig_folder, *run(kind, there.url, 0.5))
     assert done.returncode == 0, done.stderr
     record = json.loads((rig_folder / done.stdout.strip() / "record.json").read_text())
     assert record["outcome"] == "DONE"
