@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import gaussian_filter1d
 
 Array = npt.NDArray[np.float64]
 DRAWS = 200
@@ -44,6 +43,8 @@ def swing(x: Array) -> float:
 
 def smoothed(x: Array, width: float) -> Array:
     """`x` (n,) under a Gauss window of so many samples' standard deviation."""
+    from scipy.ndimage import gaussian_filter1d  # slow to import, and wanted by evaluation alone
+
     out: Array = gaussian_filter1d(np.asarray(x, np.float64), width, mode="reflect")
     return out
 
