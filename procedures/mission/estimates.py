@@ -22,6 +22,7 @@ from procedures.mission.steps import Flight, Move, Piece, holds, motion, radial
 from procedures.shared.certificates import certified_gain
 
 Array = npt.NDArray[np.float64]
+CLEAR = 20.0  # times its noise: what noise adds is known to half; below, to its size, for the curve is noise itself
 OUT = 6.0  # standard uncertainties by which a repeat stands out
 
 
@@ -110,9 +111,10 @@ def _over_repeats(
 
 def _largest(identity: str, found: Largest, scatter: Estimate | None = None) -> Estimate:
     """With what noise and window leave: `scatter` in place of the noise of one record."""
-    half, off = abs(found.bias) / 2, found.bent / math.sqrt(3)
+    known = abs(found.bias) * (0.5 if found.value > CLEAR * found.u else 1.0)
+    off = found.bent / math.sqrt(3)
     one = Influence(f"noise/{identity}", "noise of one record", found.u, "m", "A", "normal")
-    biased = Influence(f"bias/{identity}", "what noise adds to a largest value, half of it", half, "m", "B", "normal")
+    biased = Influence(f"bias/{identity}", "what noise adds to a largest value", known, "m", "B", "normal")
     bent = Influence(f"window/{identity}", "what averaging takes off a peak", off, "m", "B", "rectangular")
     out = Estimate.of(0.0, biased) + Estimate.of(0.0, bent) + (Estimate.of(0.0, one) if scatter is None else scatter)
     return out + (found.value if scatter is None else 0.0)
@@ -186,14 +188,18 @@ def _settled(flight: Flight, rig: RigFile, plan: Plan) -> dict[tuple[str, str], 
             ("angle_error", at.angle_channel, plan.angles_rad[k], "rad"),
         ):
             where = place_of(plan, k)
-            count = rig.capture.channels[channel].scale
             stood = _type_a(f"{name}/{where}", levels(flight, plan, channel)[k], unit)
-            rounding = Influence(
-                f"rounding/{channel}", "rounding of the mean", count / math.sqrt(12), unit, "B", "rectangular"
-            )
+            rounding = _rounding(channel, rested(flight, plan, channel), rig.capture.channels[channel].scale, unit)
             gain = certified_gain(rig, channel) if channel in rig.sensors else Estimate.exact(1.0, "1")
             out[name, where] = (stood + Estimate.of(0.0, rounding)) / gain - sent
     return out
+
+
+def _rounding(channel: str, rests: Sequence[Array], count: float, unit: str) -> Influence:
+    """What rounding leaves of a mean: half a `count` at most, and the less the more noise the reading has."""
+    noise = max(float(np.mean([r.var() for r in rests])) / count**2 - 1 / 12, 0.0)  # squares of counts
+    off = count / 2 * math.exp(-2 * math.pi**2 * noise)
+    return Influence(f"rounding/{channel}", "rounding of the mean", off / math.sqrt(2), unit, "B", "arcsine")
 
 
 def place_of(plan: Plan, k: int) -> str:

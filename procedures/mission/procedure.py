@@ -195,7 +195,7 @@ def requires(rig: RigFile) -> Requires:
     except Lacking as error:
         return Requires(capabilities=("motion", "settings.observer"), lacks=error.lines, capture=("z",))
     probes = radial(rig)
-    lacks = () if probes else ("probes: found none across the shaft that a capture has; expected the radial ones",)
+    lacks = () if probes else ("probes: found none across the shaft; expected the radial ones",)
     return Requires(
         channels=(*probes.values(), at.place_channel, at.angle_channel),
         sensors=(*probes.values(), at.place_channel),

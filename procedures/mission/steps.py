@@ -33,9 +33,8 @@ def motion(rig: RigFile) -> Motion:
 
 
 def radial(rig: RigFile) -> dict[str, str]:
-    """Channels of the probes that look across the shaft, by the probes' names; those of a capture alone."""
-    captured = {} if rig.capture is None else rig.capture.channels
-    return {n: p.channel for n, p in rig.probes.items() if p.direction is not None and p.channel in captured}
+    """Channels of the probes that look across the shaft, by the probes' names."""
+    return {name: probe.channel for name, probe in rig.probes.items() if probe.direction is not None}
 
 
 def captured(rig: RigFile, plan: Plan) -> tuple[str, ...]:
