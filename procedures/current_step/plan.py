@@ -20,6 +20,7 @@ class Plan(BenchPlan):
         15e-3, ge=5e-3
     )  # from the step to the step back at least, and from there to the capture's end
     spare_s: float = Field(15e-3, ge=0)  # of a capture, for what two writes take on their way
+    tries: int = Field(3, ge=1, le=10)  # of a capture that the step or the step back is not in
     response_s: float = Field(2e-3, ge=0.5e-3)  # after a step: what the response is taken of
     settle_s: float = Field(1.0, ge=0)  # before all: the mover rocks in its rings when it is taken hold of
     push_s: float = Field(0.06, ge=0.02)  # how long the mover is looked at before the large step, and under it

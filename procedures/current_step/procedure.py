@@ -21,7 +21,7 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.capture import Layout
-from procedures.current_step import checks, estimates
+from procedures.current_step import checks, estimates, fit
 from procedures.current_step import figures as drawn
 from procedures.current_step.estimates import Place
 from procedures.current_step.plan import Plan
@@ -71,6 +71,9 @@ def captures(rig: RigFile, plan: Plan) -> Iterator[tuple[str, str, float, int]]:
         yield from ((SMALL, name, plan.small_A, k) for k in range(plan.small_repeats))
 
 
+MORE = 4  # times the spare time that a further attempt has, each
+
+
 def step_count(plan: Plan) -> int:
     """How many steps `acquire` records on a rig that tells positions beside the currents."""
     return len(plan.steps_at) * (1 + plan.repeats + plan.small_repeats)
@@ -87,20 +90,32 @@ def seconds(plan: Plan, kind: str) -> float:
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
-    """Of each place a held step with the positions, then large steps and small ones, each up and back in one capture."""
+    """Of each place a held step with the positions, then large steps and small ones, each up and back in one capture. One that
+    a slow line left outside of its capture is taken again, with more to spare; where that brings nothing, no further one."""
     assert rig.capture is not None
     rig.clock.sleep(plan.settle_s)
+    tries = plan.tries
     for number, (kind, name, size, repeat) in enumerate(captures(rig.file, plan)):
-        place, lasts = place_of(rig.file, name), seconds(plan, kind)
-        rate = rig.capture.rate_hz / (SLOWER if kind == PUSH else 1)
-        with record.step(kind, number=number, place=name, size_A=size, repeat=repeat):
-            rig.capture.arm(channels(place, kind, repeat), seconds=lasts, rate_hz=rate)
-            rig.clock.sleep(plan.push_s if kind == PUSH else plan.lead_s)
-            rig.levitation.set(place.parameter, size)
-            rig.clock.sleep(plan.push_s if kind == PUSH else plan.hold_s)
-            rig.levitation.set(place.parameter, 0.0)
-            rig.capture.wait(lasts + 5.0)
-        rig.capture.upload(None, number=number)
+        labels: dict[str, str | float] = {"number": number, "place": name, "size_A": size, "repeat": repeat}
+        came = any(_captured(rig, plan, record, kind, attempt, labels) for attempt in range(tries))
+        tries = tries if came else 1
+
+
+def _captured(rig: Rig, plan: Plan, record: Recorder, kind: str, attempt: int, labels: dict[str, str | float]) -> bool:
+    """Take one capture; whether the step and the step back are in it."""
+    assert rig.capture is not None
+    place, size = place_of(rig.file, str(labels["place"])), float(labels["size_A"])
+    lasts = seconds(plan, kind) + attempt * MORE * plan.spare_s
+    rate = rig.capture.rate_hz / (SLOWER if kind == PUSH else 1)
+    with record.step(kind, attempt=attempt, **labels):
+        rig.capture.arm(channels(place, kind, int(labels["repeat"])), seconds=lasts, rate_hz=rate)
+        rig.clock.sleep(plan.push_s if kind == PUSH else plan.lead_s)
+        rig.levitation.set(place.parameter, size)
+        rig.clock.sleep(plan.push_s if kind == PUSH else plan.hold_s)
+        rig.levitation.set(place.parameter, 0.0)
+        rig.capture.wait(lasts + 5.0)
+    data = rig.capture.upload(None, number=labels["number"], attempt=attempt)
+    return kind == PUSH or fit.edges(data.columns[place.along], size, 1 / data.rate_hz) is not None
 
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Result:

@@ -67,7 +67,7 @@ def channels(place: CurrentStep, kind: str, repeat: int) -> tuple[str, ...]:
 
 
 def read_taken(recording: Recording[Plan]) -> list[Taken]:
-    """All captures of large and small steps, in time order.
+    """All captures of large and small steps, in time order; of what was taken again the last.
 
     Raises:
         AnalysisError: there are none, or one is missing.
@@ -75,7 +75,8 @@ def read_taken(recording: Recording[Plan]) -> list[Taken]:
     found = [(kind, step) for kind in (LARGE, SMALL) for step in recording.steps(kind)]
     if not found:
         raise AnalysisError("found no steps; expected those of the plan (was the run stopped early?)")
-    return [_read(recording, *one) for one in sorted(found, key=lambda one: one[1].start_ns)]
+    last = {step.labels["number"]: (kind, step) for kind, step in sorted(found, key=lambda one: one[1].start_ns)}
+    return [_read(recording, *one) for one in last.values()]
 
 
 def _read(recording: Recording[Plan], kind: str, step: Step) -> Taken:
@@ -115,7 +116,8 @@ def moved(x: Array, count: int, before: int) -> float:
 
 
 def _captured(recording: Recording[Plan], step: Step, names: tuple[str, ...]) -> tuple[dict[str, Array], float]:
-    found = recording.captures(number=step.labels["number"])
+    attempt = {k: step.labels[k] for k in ("number", "attempt") if k in step.labels}
+    found = recording.captures(**attempt)
     if not found:
         raise AnalysisError(f"step {dict(step.labels)}: found no capture")
     return found[0].arrays(*names), 1 / found[0].rate_hz

@@ -10,7 +10,7 @@ from bench.findings import Effect, Finding
 from bench.rigfile import RigFile
 from procedures.mission.estimates import Told, gate_of, gated
 from procedures.mission.plan import Plan
-from procedures.mission.steps import Flight, radial
+from procedures.mission.steps import Flight, holds, radial
 
 UM = 1e6
 EXPECTED = ("LIFTING", "LEVITATED")
@@ -29,6 +29,12 @@ def of_flight(flight: Flight, rig: RigFile, plan: Plan) -> Iterator[Finding]:
     elif len(flight.moves) < 2 * plan.repeats or len(flight.pieces) < plan.captures:
         found, expected = (len(flight.moves), len(flight.pieces)), (2 * plan.repeats, plan.captures)
         text = f"found {found[0]} moves in {found[1]} captures; expected {expected[0]} in {expected[1]}"
+        yield Finding("moves-missing", text, "move", Effect.ERROR)
+    elif outside := [m for m in flight.moves if not any(holds(p, m) for p in flight.pieces)]:
+        text = (
+            f"{len(outside)} of {len(flight.moves)} moves lie in no capture, first that of repeat {outside[0].repeat}: "
+            "commands came later than a capture leaves room for. Take a host that is less busy"
+        )
         yield Finding("moves-missing", text, "move", Effect.ERROR)
 
 

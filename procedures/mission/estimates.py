@@ -18,7 +18,7 @@ from bench.uncertainty import Estimate, Influence
 from procedures.mission import fit
 from procedures.mission.fit import Largest
 from procedures.mission.plan import Plan
-from procedures.mission.steps import Flight, Move, Piece, motion, radial
+from procedures.mission.steps import Flight, Move, Piece, holds, motion, radial
 from procedures.shared.certificates import certified_gain
 
 Array = npt.NDArray[np.float64]
@@ -66,7 +66,7 @@ def rest_of(move: Move, plan: Plan) -> tuple[float, float]:
 
 def piece_of(flight: Flight, move: Move) -> Piece:
     """The capture that holds a move."""
-    return next(p for p in flight.pieces if p.t[0] <= move.begin and move.end <= p.t[-1] + 1e-3)
+    return next(p for p in flight.pieces if holds(p, move))
 
 
 def rested(flight: Flight, plan: Plan, channel: str) -> list[Array]:

@@ -65,6 +65,11 @@ class Move:
     end: float
 
 
+def holds(piece: Piece, move: Move) -> bool:
+    """Whether a capture has a move from its command to its end."""
+    return bool(len(piece.t)) and piece.t[0] <= move.begin and move.end <= piece.t[-1] + 1e-3
+
+
 @dataclass(frozen=True)
 class Flight:
     """What was recorded: `lift` and `pieces` are captures, `states` what the controller said, name by name with the time of the

@@ -146,6 +146,19 @@ def test_states_tell_what_happened() -> None:
     assert short.code == "moves-missing"
 
 
+def test_a_move_that_outlasts_its_capture_is_missing() -> None:
+    from procedures.mission.steps import Move, Piece
+
+    flew = flight(("READY", 0.0), ("LIFTING", 1.0), ("LEVITATED", 2.0))
+    moves = [Move(k // 2, 1 - k % 2, 2.5 + 0.5 * k, 2.5 + 0.5 * k + 0.4) for k in range(2 * Plan().repeats)]
+    whole = Piece(np.arange(2.4, moves[-1].end + 0.1, 1e-3), {})
+    assert not list(checks.of_flight(replace(flew, moves=moves, pieces=[whole]), RIG, Plan()))
+    cut = Piece(whole.t[whole.t < moves[-1].begin], {})
+    (short,) = checks.of_flight(replace(flew, moves=moves, pieces=[cut]), RIG, Plan())
+    assert short.code == "moves-missing"
+    assert f"1 of {len(moves)} moves lie in no capture, first that of repeat {moves[-1].repeat}" in short.text
+
+
 def test_what_came_down_by_itself_is_told() -> None:
     from procedures.mission.steps import Move
 

@@ -9,6 +9,7 @@ meanwhile works in the truth as it does in the run.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -20,6 +21,7 @@ from bench.rigfile import RigFile
 from sim_backend.machine import Truth
 from sim_backend.machines.lira.params import ControlParams, PlantParams
 from sim_backend.machines.lira.plant import TICKS_S, TRACE, Plant, ideal
+from sim_backend.machines.lira.settings import SETTINGS
 from sim_backend.motion import CurrentAsked
 
 Array = npt.NDArray[np.float64]
@@ -108,7 +110,8 @@ def currents(rig: RigFile, drawn: Truth, asked: CurrentAsked) -> Mapping[tuple[s
     """Of every place its times, bands, overshoot and what goes across; the supply."""
     built = drawn.plant
     out: dict[tuple[str, str], float] = {("u_dc", ""): built.plant.supply}
-    stepped = Stepped(built.plant, built.control, asked.angle, built.factors)
+    told = {s.field: rig.parameters[s.name].default for s in SETTINGS if s.name in rig.parameters}
+    stepped = Stepped(built.plant, replace(built.control, **told), asked.angle, built.factors)
     count = round(asked.response_s * TICKS_S)
     for place, name in asked.steps.items():
         along, across = (x / asked.size for x in stepped.step(name, asked.size))
