@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import pairwise
 
-from bench.errors import DeviceFault, InterlockError, Lacking
+from bench.errors import DeviceFault, InterlockError
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
@@ -190,10 +190,9 @@ def figures(results: Results, recording: Recording[Plan]) -> Iterable[Figure]:
 
 def requires(rig: RigFile) -> Requires:
     """By the names that the rig's machine has."""
-    try:
-        at = motion(rig)
-    except Lacking as error:
-        return Requires(capabilities=("motion", "settings.observer"), lacks=error.lines, capture=("z",))
+    if rig.capabilities.motion is None:
+        return Requires(capabilities=("motion", "settings.observer"))
+    at = motion(rig)
     probes = radial(rig)
     lacks = () if probes else ("probes: found none across the shaft; expected the radial ones",)
     return Requires(
