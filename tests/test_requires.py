@@ -84,11 +84,7 @@ def without_capability(rig: RigFile, key: str) -> RigFile:
         holder[last] = ""
         if table == "model":
             del holder[last]
-<<<<<<< HEAD
     elif last in ("path", "injection", "motion", "loop_injection"):
-=======
-    elif last in ("path", "injection", "motion"):
->>>>>>> 1d3a654b227e8c4c8df80dec47b566fc7f84c193
         holder[last] = None
     elif key == "set_points" or holder is content or isinstance(holder[last], dict):
         holder[last] = {}
