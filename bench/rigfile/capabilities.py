@@ -16,6 +16,7 @@ from bench.rigfile.part import Part
 from bench.rigfile.toleranced import Toleranced
 
 Coordinate = Literal["x", "y", "z", "psi", "theta"]
+InjectionPlace = Literal["sensor", "reference", "force"]
 
 
 class SetPoints(Part):
@@ -53,6 +54,47 @@ class Injection(Part):
     hz: str
     lines: str = ""
     step: str = ""
+
+
+class Bit(Part):
+    """What a channel says: any of the bits of `mask`, or, without one, that it is not zero."""
+
+    channel: str
+    mask: int | None = Field(None, gt=0)
+
+
+class InjectedLoop(Part):
+    """A position loop: `value` of the parameter that chooses it, the `channel` that shows what it holds (of telemetry and of
+    captures alike), m or rad. What is told beside it: parameters of its PID `kp`, `ki`, `kd` and of the greatest force that it
+    asks for, `limit`, N or N m; what it moves, `share` of the number `inertia`, and the negative `stiffness` that it holds
+    against, by their places in this file; the bit that says that it is `limited`."""
+
+    value: float
+    channel: str
+    kp: str = ""
+    ki: str = ""
+    kd: str = ""
+    limit: str = ""
+    inertia: str = ""
+    share: float = Field(1.0, gt=0)
+    stiffness: str = ""
+    limited: Bit | None = None
+
+
+class LoopInjection(Part):
+    """A sine into one position loop: parameter `axis` chooses it by the value that `loops` have, `off` none; `place`, where it
+    is added, by the values of `places`: to the reading as the loop has it, to the reference together with its rate, or to the
+    force that the loop asks for. `amplitude` m, rad, N or N m; `hz`. `wave`: the channel of captures that has the sine as a
+    share of its amplitude, at the sample of the readings that it acts with."""
+
+    axis: str
+    off: float = -1.0
+    place: str
+    places: Mapping[InjectionPlace, float] = Field(min_length=1)
+    amplitude: str
+    hz: str
+    wave: str = ""
+    loops: Mapping[Name, InjectedLoop] = Field(min_length=1)
 
 
 class Holding(Part):
@@ -117,13 +159,6 @@ class MotorForce(Part):
     circle_hz: str = ""
 
 
-class Bit(Part):
-    """What a channel says: any of the bits of `mask`, or, without one, that it is not zero."""
-
-    channel: str
-    mask: int | None = Field(None, gt=0)
-
-
 class Status(Part):
     """What the controller says of the machine, by its meaning; what it does not say is judged from readings
     (`bench.rigfile.judged`)."""
@@ -145,6 +180,7 @@ class Capabilities(Part):
     set_points: SetPoints = SetPoints()
     path: Path | None = None
     injection: Injection | None = None
+    loop_injection: LoopInjection | None = None
     bias: Mapping[Name, str] = {}
     settings: Mapping[Name, Mapping[Name, Mapping[str, float]]] = {}
     angle: Holding | None = None
@@ -188,6 +224,8 @@ def _tables(c: Capabilities) -> Iterator[tuple[str, str | Mapping[str, str]]]:
         yield from ((f"path.{key}", value) for key, value in path)
     if injection is not None:
         yield from ((f"injection.{key}", value) for key, value in injection if key not in ("axes", "off"))
+    if c.loop_injection is not None:
+        yield from _of_loops(c.loop_injection)
     yield "bias", c.bias
     for kind, names in c.settings.items():
         for name, values in names.items():
@@ -201,6 +239,12 @@ def _tables(c: Capabilities) -> Iterator[tuple[str, str | Mapping[str, str]]]:
     yield "model", c.model
     for key in ("landing_speed", "lift_time", "watchdog", "current_limit"):
         yield key, getattr(c, key)
+
+
+def _of_loops(can: LoopInjection) -> Iterator[tuple[str, str | Mapping[str, str]]]:
+    yield from ((f"loop_injection.{key}", getattr(can, key)) for key in ("axis", "place", "amplitude", "hz"))
+    for name, one in can.loops.items():
+        yield from ((f"loop_injection.loops.{name}.{key}", getattr(one, key)) for key in ("kp", "ki", "kd", "limit"))
 
 
 def is_bound(c: Capabilities, key: str) -> bool:

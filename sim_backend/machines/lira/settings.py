@@ -91,5 +91,7 @@ def _measurement(column: str) -> Measurement:
 
 INNER: Final = tuple(Measurement(f"i_{name}", f"i_{name}", "A", 1e-3) for name in DQ)
 """The firmware's own dq currents."""
-MEASUREMENTS: Final = (*(_measurement(c) for c in MEASURED), *INNER)
+WAVE: Final = Measurement("wave", "wave", "1", 2**-15)
+"""The sine that is injected, as a share of its amplitude."""
+MEASUREMENTS: Final = (*(_measurement(c) for c in MEASURED), *INNER, WAVE)
 """The 52 and the firmware's own, in the order of a capture's mask, the first one in its lowest bit."""

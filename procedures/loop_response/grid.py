@@ -1,0 +1,64 @@
+"""At which frequencies a loop is looked at next, by what was seen of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from procedures.loop_response.fit import HALF
+from procedures.loop_response.plan import Plan
+
+FALLEN = 0.5  # of |y/r|: a survey goes on until it is below
+HALVINGS = 3  # of what encloses the -3 dB point, or of what is beside the greatest sensitivity
+PEAK_WITHIN = 0.4  # of the logarithm of the frequency: how far about a sensitivity's maximum lines lie
+
+
+def survey(plan: Plan) -> list[float]:
+    """The lines of a first look, Hz."""
+    return np.geomspace(plan.low_hz, plan.high_hz, plan.lines).tolist()
+
+
+def goes_on(seen: Mapping[float, float]) -> bool:
+    """Whether the survey of |y/r|, by frequency, goes on upwards."""
+    return not seen or min(seen.values()) > FALLEN
+
+
+def halving(seen: Mapping[float, float]) -> float | None:
+    """Between which lines the last fall through -3 dB is: the frequency in their middle; None where there is none."""
+    hz = sorted(seen)
+    above = [k for k in range(len(hz) - 1) if seen[hz[k]] >= HALF > seen[hz[k + 1]]]
+    return float(np.sqrt(hz[above[-1]] * hz[above[-1] + 1])) if above else None
+
+
+def fall(seen: Mapping[float, float]) -> float | None:
+    """Where the last fall through -3 dB is, interpolated; None where there is none."""
+    hz = sorted(seen)
+    for one, other in reversed(list(zip(hz[:-1], hz[1:], strict=True))):
+        if seen[one] >= HALF > seen[other]:
+            share = np.log(seen[one] / HALF) / np.log(seen[one] / seen[other])
+            return float(one * (other / one) ** share)
+    return None
+
+
+def beside(seen: Mapping[float, float]) -> list[float]:
+    """The middles of the two gaps beside the greatest; one where it is the first or the last."""
+    hz = sorted(seen)
+    k = max(range(len(hz)), key=lambda j: seen[hz[j]])
+    return [float(np.sqrt(hz[j] * hz[j + 1])) for j in (k - 1, k) if 0 <= j < len(hz) - 1]
+
+
+def top(seen: Mapping[float, float]) -> float:
+    """Where the greatest is, by a parabola through it and its neighbours; the line itself where it is the first or last."""
+    hz = sorted(seen)
+    k = max(range(len(hz)), key=lambda j: seen[hz[j]])
+    if not 0 < k < len(hz) - 1:
+        return hz[k]
+    x = np.log(np.array(hz[k - 1 : k + 2]) / hz[k])
+    c, b, _ = np.polyfit(x, np.log([seen[f] for f in hz[k - 1 : k + 2]]), 2)
+    return float(hz[k] * np.exp(np.clip(-b / (2 * c), x[0], x[2]))) if c < 0 else hz[k]
+
+
+def about(hz: float, within: float, count: int) -> list[float]:
+    """So many lines about a frequency."""
+    return [float(hz * np.exp(x)) for x in np.linspace(-within, within, count)]
