@@ -15,7 +15,7 @@ from sim_backend.machines.lira.controller import LineController, SpokenControlle
 from sim_backend.machines.lira.operator import Attendant
 from sim_backend.machines.lira.params import COILS, ControlParams, Each, PlantParams
 from sim_backend.machines.lira.plant import DQ, TICKS_S, Plant
-from sim_backend.machines.lira.settings import BY_NAME
+from sim_backend.machines.lira.settings import BY_NAME, INJECTED
 
 HALVES: Final = range(1, COILS + 1)
 """Coils and half-bridges by their numbers: coil k is driven by half-bridge k."""
@@ -247,7 +247,7 @@ LIRA = Machine(
     copper_W=copper_W,
     operator=operator,
     daily=DAILY,
-    controls=frozenset(BY_NAME),
+    controls=frozenset((*BY_NAME, *INJECTED)),
     tick_s=1 / TICKS_S,
     period_s=PERIOD_S,
     controller=SpokenController,

@@ -62,6 +62,8 @@ SETTINGS: Final = (
     Setting("z.off", "z_off", "m", 0, 5e-3),
     Setting("v.land", "v_land", "m/s", 0, 0.1),
 )
+INJECTED: Final = ("inject_axis", "inject_place", "inject_amplitude", "inject_hz")
+"""What the line's `inj` says, by the names that rig files may have for it."""
 BY_NAME: Final = {s.name: s for s in SETTINGS}
 AXES_OF_LINE: Final = {"x1": "x1", "x2": "x2", "y1": "y1", "y2": "y2", "z": "z", "gamma": "angle"}
 
