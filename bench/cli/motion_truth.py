@@ -211,6 +211,26 @@ def _sensitivity(done: Simulated) -> Found:
                     yield name, where, margin(open_loop)
 
 
+def _loops(done: Simulated) -> Found:
+    from procedures.loop_response import ideal
+    from procedures.loop_response.injection import ability, chosen, sensitive, settle_s
+    from sim_backend.motion import LoopsAsked
+
+    plan: Any = done.recording.plan
+    rig, of = done.recording.rig, done.drawn.machine.motions.loops
+    if of is None:
+        return
+    lines = {ability(rig).loops[axis].channel: axis for axis in chosen(rig, plan)}
+    axes = {line: 2 * settle_s(rig, plan, axis) for line, axis in lines.items()}
+    looked = [line for line, axis in lines.items() if axis in sensitive(rig, plan)]
+    asked = LoopsAsked(_settings(done, plan.parameters), plan.parameters, axes, looked, plan.low_hz, plan.high_hz)
+    for (name, line), value in of(rig, done.drawn, asked).items():
+        yield name, lines[line], value
+    for axis in chosen(rig, plan):
+        if (at := ideal.of_values(rig, plan, axis, done.drawn.values)) is not None:
+            yield "bandwidth_ideal", axis, at
+
+
 def _spindown(done: Simulated) -> Found:
     from sim_backend.motion import DragAsked
 
@@ -378,6 +398,7 @@ TRUTHS: Mapping[str, Callable[[Any], Found]] = {
     "run-up": _passage,
     "coast-down": _passage,
     "sensitivity": _sensitivity,
+    "loop-response": _loops,
     "spindown": _spindown,
     "angle-step": _angle,
     "maximum-speed": _maximum_speed,

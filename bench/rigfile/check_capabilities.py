@@ -32,7 +32,8 @@ def problems_of(rig: RigFile) -> Iterator[Problem]:
 Line = tuple[str, str, str]
 KINDS = {"set_points.axes": "m", "set_points.slew": "m/s", "set_points.slew_tilt": "rad/s", "path.y": "m", "path.z": "m",
          "path.hz": "Hz", "path.phase": "rad", "path.ramp_s": "s", "injection.amplitude": "A", "injection.hz": "Hz",
-         "injection.step": "Hz", "loop_injection.hz": "Hz", "bias": "A", "angle.ref": "rad", "angle.slew": "rad/s", "angle.speed": "rad/s",
+         "injection.step": "Hz", "loop_injection.hz": "Hz",
+         "bias": "A", "angle.ref": "rad", "angle.slew": "rad/s", "angle.speed": "rad/s",
          "motor.phase_slew": "rad/s", "motor.phase_limit": "rad", "motor.circle": "m", "motor.circle_hz": "Hz",
          "current_limit": "A", "landing_speed": "rad/s", "lift_time": "s", "watchdog": "s"}  # fmt: skip
 COORDINATES = {"x": "m", "y": "m", "z": "m", "psi": "rad", "theta": "rad"}

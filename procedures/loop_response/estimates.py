@@ -43,7 +43,7 @@ def results(taken: Sequence[Taken], rig: RigFile, plan: Plan) -> tuple[list[Resu
         found: dict[str, Estimate] = {}
         crossing = summit = None
         try:
-            crossing = fit.crossing(*_columns(of_loop(taken, axis, REFERENCE, REFINED)))
+            crossing = fit.crossing(*_columns(of_loop(taken, axis, REFERENCE, REFINED), rig))
             found["bandwidth"] = _bandwidth(crossing, of_loop(taken, axis, REFERENCE, REFINED), axis, rig, plan)
         except AnalysisError as error:
             failed.append(_failed("no-crossing", str(error), axis, "bandwidth"))
@@ -51,7 +51,7 @@ def results(taken: Sequence[Taken], rig: RigFile, plan: Plan) -> tuple[list[Resu
             found["bandwidth_ideal"] = computed
         if axis in sensitive(rig, plan):
             try:
-                summit = fit.summit(*_columns(of_loop(taken, axis, SENSOR, REFINED)))
+                summit = fit.summit(*_columns(of_loop(taken, axis, SENSOR, REFINED), rig))
                 found |= _greatest(summit, of_loop(taken, axis, SENSOR, REFINED), axis, rig, plan)
             except AnalysisError as error:
                 failed.append(_failed("no-maximum", str(error), axis, "s_max"))
@@ -64,9 +64,11 @@ def _failed(code: str, why: str, axis: str, name: str) -> Finding:
                    (f"{name}@{axis}",))  # fmt: skip
 
 
-def _columns(some: Sequence[Taken]) -> tuple[Array, Array, Array]:
+def _columns(some: Sequence[Taken], rig: RigFile) -> tuple[Array, Array, Array]:
+    """Frequencies, sizes and their standard uncertainties by noise and counts."""
     lines = [t.line for t in some if t.line is not None]
-    return np.array([t.hz for t in some]), np.array([x.size for x in lines]), np.array([x.u for x in lines])
+    u = [math.hypot(t.line.u, rounding(t, rig)) for t in some if t.line is not None]
+    return np.array([t.hz for t in some]), np.array([x.size for x in lines]), np.array(u)
 
 
 def _bandwidth(at: Point, some: Sequence[Taken], axis: str, rig: RigFile, plan: Plan) -> Estimate:
@@ -80,12 +82,11 @@ def _bandwidth(at: Point, some: Sequence[Taken], axis: str, rig: RigFile, plan: 
             f"interpolation/{axis}", "curve between the lines", at.hz * ideal.misfit(rig, plan, axis, shares), "Hz"
         )
         + _bound(f"settling/{axis}", "what is left of the beginning", per * unsettled(some, axis, rig, plan), "Hz")
-        + _bound(f"rounding/{axis}", "counts of the reading", per * rounding(some, axis, rig), "Hz")
     )
 
 
 def _greatest(at: Point, some: Sequence[Taken], axis: str, rig: RigFile, plan: Plan) -> dict[str, Estimate]:
-    left = unsettled(some, axis, rig, plan) + rounding(some, axis, rig)
+    left = unsettled(some, axis, rig, plan)
     size = (
         Estimate.exact(at.size, "1")
         + Estimate.of(0.0, _scatter(at, at.of_size, some, axis, "s_max", at.size, "1"))
@@ -101,8 +102,8 @@ def _scatter(
     """Of the readings beside each line: what is not the sine's."""
     u = scale * math.sqrt(float(slopes @ at.fit.covariance @ slopes))
     dof = float(np.mean([t.line.dof for t in some if t.line is not None]))
-    return Influence(id=f"scatter/{axis}/{name}", name="noise of the readings", u=u, unit=unit, kind="A", distribution="normal",
-                     dof=dof, source="bins beside the lines")  # fmt: skip
+    return Influence(id=f"scatter/{axis}/{name}", name="noise and counts of the readings", u=u, unit=unit, kind="A",
+                     distribution="normal", dof=dof, source="bins beside the lines; converter")  # fmt: skip
 
 
 def _bound(identity: str, name: str, half: float, unit: str) -> Estimate:
@@ -122,17 +123,14 @@ def _tau(rig: RigFile, plan: Plan, axis: str) -> float:
     return integrator_s(rig, plan, ability(rig).loops[axis])
 
 
-def rounding(some: Sequence[Taken], axis: str, rig: RigFile) -> float:
-    """By which share of themselves lines may be wrong by the counts of the reading. A rounding of step q after noise s adds to a
-    sine of amplitude Y at most (2 q/(pi Y)) exp(-2 pi^2 s^2/q^2) |J1(2 pi Y/q)| (Widrow and Kollar, Quantization Noise, 2008,
-    first term); |J1(x)| < sqrt(2/(pi x)). Its sign goes with Y and the standing of the loop, another for each line."""
+def rounding(t: Taken, rig: RigFile) -> float:
+    """Standard uncertainty of |y| by the counts of the reading, as a share of what was injected. A rounding of step q after
+    noise s adds at most (2 q/pi) exp(-2 pi^2 s^2/q^2) |J1(2 pi Y/q)| to a sine of amplitude Y (Widrow and Kollar,
+    Quantization Noise, 2008: the first term of the rounding's series); |J1(x)| < sqrt(2/(pi x)). Its sign goes with Y and with where the loop
+    stands between two counts: another for each line, an arcsine."""
     assert rig.capture is not None
-    q = rig.capture.channels[ability(rig).loops[axis].channel].scale
-    worst = 0.0
-    for t in some:
-        if t.line is None or t.line.swing <= 0:
-            continue
-        y = t.line.swing
-        bessel = min(0.6, math.sqrt(q / (math.pi**2 * y)))
-        worst = max(worst, 2 * q / (math.pi * y) * math.exp(-2 * (math.pi * t.line.rms / q) ** 2) * bessel)
-    return worst / math.sqrt(max(len(some), 1))
+    assert t.line is not None
+    q = rig.capture.channels[ability(rig).loops[t.axis].channel].scale
+    noise = max(t.line.rms**2 - q * q / 12, 0.0)  # without what rounding itself adds
+    bessel = min(0.582, math.sqrt(q / (math.pi**2 * max(t.line.swing, 1e-300))))
+    return 2 * q / math.pi * math.exp(-2 * noise * (math.pi / q) ** 2) * bessel / math.sqrt(2) / t.amplitude

@@ -44,9 +44,7 @@ def _responses(some: Sequence[Result]) -> Figure:
 def _sensitivities(some: Sequence[Result]) -> Figure:
     edges = [0.0, *ZONES, np.inf]
     bands = tuple((f"zone {n}", low, high) for n, low, high in zip("ABCD", edges[:-1], edges[1:], strict=True))
-    series, notes = [], []
-    for r in some:
-        series.append(_curve(r.sensitivity, r.axis))
+    series, notes = [_curve(r.sensitivity, r.axis) for r in some], []
     worst = max((r for r in some if "s_max" in r.estimates), key=lambda r: r.estimates["s_max"].value, default=None)
     if worst is not None:
         size, at = worst.estimates["s_max"], worst.estimates["s_max_hz"].value
@@ -54,6 +52,6 @@ def _sensitivities(some: Sequence[Result]) -> Figure:
         half = np.array([max(i.high - size.value, size.value - i.low)])
         series.append(Series("greatest, 95 %", np.array([at]), np.array([size.value]), "points", half))
         notes.append((f"{worst.axis}: {size.value:.2f} at {at:.1f} Hz", at, size.value))
-    return Figure("sensitivity", "Sensitivity of the loops", "|S| by a sine added to the reading, all other loops closed; zones "
-                  "after ISO 14839-3.", "frequency (Hz)", "|S|", tuple(series), bands=bands, notes=tuple(notes),
-                  log_x=True)  # fmt: skip
+    caption = "|S| by a sine added to the reading, all other loops closed; zones after ISO 14839-3."
+    return Figure("sensitivity", "Sensitivity of the loops", caption, "frequency (Hz)", "|S|", tuple(series), bands=bands,
+                  notes=tuple(notes), log_x=True)  # fmt: skip

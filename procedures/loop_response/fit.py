@@ -16,6 +16,7 @@ Array = npt.NDArray[np.float64]
 HALF = math.sqrt(0.5)
 BESIDE = 12  # bins on either side of a line that tell its noise
 LEVEL = math.log(HALF)
+TOP_DEGREE = 4
 
 
 @dataclass(frozen=True)
@@ -37,32 +38,38 @@ def line(y: npt.ArrayLike, periods: int, amplitude: float, wave: npt.ArrayLike |
     """Of readings `y` (n,) that hold so many whole periods of a sine of that `amplitude`, `wave` (n,) as a share of it;
     `sensed`: it was added to the reading, and |S| = |y + injected|/amplitude is asked for, else |y|/amplitude.
 
-    The noise of the line is what its neighbours among the bins have (a straight line is taken away before, for what drifts
-    leaks into the lowest ones); harmonics are none of them.
+    The noise of the line is what its neighbours among the bins have, of what is left without the sine and a straight line;
+    harmonics are none of them.
 
     Raises:
         AnalysisError: too few periods, or |S| without the wave.
     """
     values = np.asarray(y, np.float64)
     n = values.size
-    t = np.arange(n) - (n - 1) / 2
-    values = values - values.mean() - t * (t @ values) / (t @ t)
     if periods < 4 or n < 4 * periods:
         raise AnalysisError(f"line: found {periods} periods in {n} samples; expected 4 or more, of 4 samples at least")
+    found, left = _without_trend(values, periods)
     bins = np.arange(max(2, periods - BESIDE), min(periods + BESIDE + 1, n // 2))
     bins = bins[bins % periods != 0]
-    spectrum = np.fft.rfft(values) * 2 / n
-    noise = float(np.mean(np.abs(spectrum[bins]) ** 2)) / 2
-    found, of_wave = complex(spectrum[periods]), math.nan
+    noise = float(np.mean(np.abs(np.fft.rfft(left)[bins] * 2 / n) ** 2)) / 2
+    of_wave = math.nan
     if wave is not None:
-        phasor = complex(np.fft.rfft(np.asarray(wave, np.float64))[periods] * 2 / n)
+        phasor, _ = _without_trend(np.asarray(wave, np.float64), periods)
         of_wave = abs(phasor)
         found = found / (phasor / of_wave) if of_wave else found
     if sensed and wave is None:
         raise AnalysisError("line: |S| needs the phase of what was added to the reading; found no wave")
     size = abs(1 + found / amplitude) if sensed else abs(found) / amplitude
-    rms = math.sqrt(max(float(np.mean(values**2)) - abs(found) ** 2 / 2, 0.0))
+    rms = math.sqrt(float(np.mean(left**2)))
     return Line(size, math.sqrt(noise) / amplitude, 2.0 * bins.size, of_wave, abs(found), rms)
+
+
+def _without_trend(values: Array, periods: int) -> tuple[complex, Array]:
+    """The phasor of so many periods beside a straight line, and what is left of both (n,). Taken off before, a line would take
+    a share of up to 6/(pi p)^2 of the sine with it."""
+    turn = 2 * np.pi * periods * np.arange(values.size) / values.size
+    fit = linear(np.column_stack([np.cos(turn), np.sin(turn), np.ones_like(turn), np.linspace(-1, 1, values.size)]), values)
+    return complex(fit.terms[0], -fit.terms[1]), fit.residuals
 
 
 @dataclass(frozen=True)
@@ -77,26 +84,26 @@ class Point:
     of_size: Array
 
 
-def parabola(hz: npt.ArrayLike, size: npt.ArrayLike, u: npt.ArrayLike) -> tuple[Fit, float]:
-    """ln(size) as a parabola in ln(hz/centre), with the centre, Hz; `hz`, `size` and its `u` are (m,).
+def polynomial(hz: npt.ArrayLike, size: npt.ArrayLike, u: npt.ArrayLike, degree: int) -> tuple[Fit, float]:
+    """ln(size) as a polynomial in ln(hz/centre), lowest power first, with the centre, Hz; `hz`, `size` and its `u` are (m,).
 
     Raises:
-        AnalysisError: fewer than four lines.
+        AnalysisError: not more lines than terms.
     """
     f, s, w = (np.asarray(a, np.float64) for a in (hz, size, u))
-    if f.size < 4:
-        raise AnalysisError(f"parabola: found {f.size} lines; expected four or more")
+    if f.size <= degree + 1:
+        raise AnalysisError(f"found {f.size} lines; expected more than {degree + 1}")
     centre = float(np.exp(np.log(f).mean()))
-    return linear(np.vander(np.log(f / centre), 3, increasing=True), np.log(s), (w / s) ** 2), centre
+    return linear(np.vander(np.log(f / centre), degree + 1, increasing=True), np.log(s), (w / s) ** 2), centre
 
 
 def crossing(hz: npt.ArrayLike, size: npt.ArrayLike, u: npt.ArrayLike) -> Point:
-    """Where the curve falls through -3 dB, 1/sqrt(2), within its lines or at most as far again beyond them.
+    """Where the curve falls through -3 dB, 1/sqrt(2), by a parabola, within its lines or at most as far again beyond them.
 
     Raises:
         AnalysisError: it does not.
     """
-    fit, centre = parabola(hz, size, u)
+    fit, centre = polynomial(hz, size, u, 2)
     a, b, c = fit.terms
     reach = 2 * float(np.abs(np.log(np.asarray(hz) / centre)).max())
     roots = np.roots([c, b, a - LEVEL])
@@ -109,18 +116,22 @@ def crossing(hz: npt.ArrayLike, size: npt.ArrayLike, u: npt.ArrayLike) -> Point:
 
 
 def summit(hz: npt.ArrayLike, size: npt.ArrayLike, u: npt.ArrayLike) -> Point:
-    """The greatest of the curve.
+    """The greatest of the curve, by a polynomial of degree TOP_DEGREE: about a maximum a curve is not even.
 
     Raises:
         AnalysisError: it has none among its lines.
     """
-    fit, centre = parabola(hz, size, u)
-    a, b, c = fit.terms
-    x = -b / (2 * c) if c < 0 else math.inf
-    if not abs(x) <= float(np.abs(np.log(np.asarray(hz) / centre)).max()):
+    fit, centre = polynomial(hz, size, u, TOP_DEGREE)
+    curve = np.polynomial.Polynomial(fit.terms)
+    low, high = (float(np.log(f / centre)) for f in (np.min(hz), np.max(hz)))
+    tops = [float(x.real) for x in curve.deriv().roots() if abs(x.imag) < 1e-9 and low < x.real < high]
+    tops = [x for x in tops if curve.deriv(2)(x) < 0]
+    if not tops:
         raise AnalysisError("the sensitivity has no maximum among the lines about it")
-    top = np.array([1.0, x, x * x])
-    return Point(centre * math.exp(x), math.exp(a + b * x + c * x * x), fit, np.array([0.0, -1, -2 * x]) / (2 * c), top)
+    x = max(tops, key=curve)
+    powers = np.arange(TOP_DEGREE + 1)
+    slopes = np.where(powers > 0, powers * x ** np.maximum(powers - 1.0, 0.0), 0.0)
+    return Point(centre * math.exp(x), math.exp(curve(x)), fit, -slopes / curve.deriv(2)(x), x**powers)
 
 
 def falls_at(gain: Callable[[Array], Array], low: float, high: float) -> float:

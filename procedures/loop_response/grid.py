@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 
 import numpy as np
 
@@ -10,8 +11,10 @@ from procedures.loop_response.fit import HALF
 from procedures.loop_response.plan import Plan
 
 FALLEN = 0.5  # of |y/r|: a survey goes on until it is below
-HALVINGS = 3  # of what encloses the -3 dB point, or of what is beside the greatest sensitivity
-PEAK_WITHIN = 0.4  # of the logarithm of the frequency: how far about a sensitivity's maximum lines lie
+HALVINGS = 3  # of what encloses the -3 dB point
+BESIDE = 2  # halvings of what is beside the greatest sensitivity
+DOWN = 0.08  # of the logarithm of |S|, by which it is less at the outer lines about its maximum
+PEAK_WITHIN = (0.08, 0.4)  # of the logarithm of the frequency: how far about a maximum lines lie
 
 
 def survey(plan: Plan) -> list[float]:
@@ -34,7 +37,7 @@ def halving(seen: Mapping[float, float]) -> float | None:
 def fall(seen: Mapping[float, float]) -> float | None:
     """Where the last fall through -3 dB is, interpolated; None where there is none."""
     hz = sorted(seen)
-    for one, other in reversed(list(zip(hz[:-1], hz[1:], strict=True))):
+    for one, other in reversed(list(pairwise(hz))):
         if seen[one] >= HALF > seen[other]:
             share = np.log(seen[one] / HALF) / np.log(seen[one] / seen[other])
             return float(one * (other / one) ** share)
@@ -48,15 +51,18 @@ def beside(seen: Mapping[float, float]) -> list[float]:
     return [float(np.sqrt(hz[j] * hz[j + 1])) for j in (k - 1, k) if 0 <= j < len(hz) - 1]
 
 
-def top(seen: Mapping[float, float]) -> float:
-    """Where the greatest is, by a parabola through it and its neighbours; the line itself where it is the first or last."""
+def top(seen: Mapping[float, float]) -> tuple[float, float]:
+    """Where the greatest is, by a parabola through it and its neighbours, and how far about it lines should lie, of the logarithm
+    of the frequency: where it has fallen by DOWN. The line itself where it is the first or the last."""
     hz = sorted(seen)
     k = max(range(len(hz)), key=lambda j: seen[hz[j]])
     if not 0 < k < len(hz) - 1:
-        return hz[k]
+        return hz[k], PEAK_WITHIN[1]
     x = np.log(np.array(hz[k - 1 : k + 2]) / hz[k])
     c, b, _ = np.polyfit(x, np.log([seen[f] for f in hz[k - 1 : k + 2]]), 2)
-    return float(hz[k] * np.exp(np.clip(-b / (2 * c), x[0], x[2]))) if c < 0 else hz[k]
+    if c >= 0:
+        return hz[k], PEAK_WITHIN[1]
+    return float(hz[k] * np.exp(np.clip(-b / (2 * c), x[0], x[2]))), float(np.clip(np.sqrt(-DOWN / c), *PEAK_WITHIN))
 
 
 def about(hz: float, within: float, count: int) -> list[float]:

@@ -1,9 +1,10 @@
-"""What a loop would be with an actuator that gives at once what it is asked for, and an observer that is right: computed from the
-rig file's gains and masses, not measured."""
+"""What a loop would be with an actuator that gives at once what it is asked for, and an observer that is right: computed from
+the rig file's gains and masses, not measured."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 import numpy.typing as npt
@@ -60,6 +61,16 @@ def bandwidth(rig: RigFile, plan: Plan, axis: str) -> Estimate | None:
         moved = [x.value * (1 + STEP * (j == k)) for j, x in enumerate((inertia, stiffness))]
         out = out + (one - one.value) * ((_falls(moved[0], moved[1], gains) - at) / (STEP * one.value))
     return out
+
+
+def of_values(rig: RigFile, plan: Plan, axis: str, values: Mapping[str, float]) -> float | None:
+    """The same of numbers that are known, by the rig file's tables and names: `machine.mass`; None where it cannot be told."""
+    found, loop = numbers(rig, plan, axis), ability(rig).loops[axis]
+    if found is None:
+        return None
+    inertia = values[loop.inertia.replace("/", ".")] * loop.share
+    stiffness = values[loop.stiffness.replace("/", ".")] if loop.stiffness else 0.0
+    return _falls(inertia, stiffness, found[2])
 
 
 def _falls(inertia: float, stiffness: float, gains: tuple[float, float, float]) -> float:

@@ -1,7 +1,8 @@
 """Response of position loops: |y/r| with the reference and its rate injected, and |S| with the reading injected.
 
-Measurands, by loop, all other loops closed: where |y/r| falls through -3 dB, and the greatest |S|. Beside them, computed and not
-measured: where an ideal actuator's would.
+Measurands, by loop, all other loops closed: where |y/r| falls through -3 dB, and the greatest |S|. Beside them, computed
+and not measured: where an ideal
+actuator's would.
 """
 
 from __future__ import annotations
@@ -55,13 +56,13 @@ MARGIN_S = 1e-3  # of a capture
 
 def step_count(plan: Plan) -> int:
     """How many steps `acquire` records of six loops at most, for the progress display."""
-    return (len(plan.axes) or 6) * 2 * (plan.lines + grid.HALVINGS + plan.refined)
+    return (len(plan.axes) or 6) * 2 * (plan.lines + 2 * grid.BESIDE + plan.refined)
 
 
 def steps_on(rig: RigFile, plan: Plan) -> int:
     """How many it records on a rig, at most."""
     looks = len(chosen(rig, plan)) + len(sensitive(rig, plan))
-    return looks * (plan.lines + grid.HALVINGS + plan.refined)
+    return looks * (plan.lines + 2 * grid.BESIDE + plan.refined)
 
 
 def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
@@ -102,7 +103,8 @@ class _Look:
             "periods": one.periods, "samples": one.samples, "number": next(self.numbers),
         }  # fmt: skip
         assert rig.capture is not None
-        with injected(rig, self.axis, self.place, one, settle_s(rig.file, plan, self.axis)):
+        start = plan.start_s if kind == SURVEY else settle_s(rig.file, plan, self.axis)
+        with injected(rig, self.axis, self.place, one, start):
             with self.record.step(STEP, **labels):
                 seconds = one.samples / rate(rig.file, plan) + MARGIN_S
                 rig.capture.arm(
@@ -133,10 +135,11 @@ def _sensor(look: _Look) -> None:
     """The whole range, then beside the greatest, then finely about it."""
     for hz in grid.survey(look.plan):
         look.take(hz, SURVEY)
-    for hz in grid.beside(look.seen) if look.seen else ():
-        look.take(hz, SURVEY)
+    for _ in range(grid.BESIDE if look.seen else 0):
+        for hz in grid.beside(look.seen):
+            look.take(hz, SURVEY)
     if look.seen:
-        for hz in grid.about(grid.top(look.seen), grid.PEAK_WITHIN, look.plan.refined):
+        for hz in grid.about(*grid.top(look.seen), look.plan.refined):
             look.take(hz, REFINED)
 
 
@@ -172,7 +175,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
         yield f"parameters: found {', '.join(unknown)}; expected parameters of this rig"
         return
     if plan.high_hz > BELOW * rate(rig, plan):
-        yield f"high_hz: found {plan.high_hz:g}; expected {BELOW * rate(rig, plan):g} or less: {BELOW:g} of the rate of captures"
+        most = f"{BELOW * rate(rig, plan):g} or less: {BELOW:g} of the rate of captures"
+        yield f"high_hz: found {plan.high_hz:g}; expected {most}"
     yield from of_rate(rig, plan.rate_hz)
     for axis in chosen(rig, plan):
         for place in (REFERENCE, *([SENSOR] if axis in sensitive(rig, plan) else ())):

@@ -210,7 +210,10 @@ def test_a_listener_has_no_way_to_send_and_tells_what_was_lost() -> None:
 @pytest.mark.parametrize(
     ("url", "said"),
     [
-        ("inprocess:", "where nothing can be listened to; expected a URL that starts with slcan:, can:, serial: or cli:"),
+        (
+            "inprocess:",
+            "where nothing can be listened to; expected a URL that starts with slcan:, can:, serial: or cli:",
+        ),
         ("slcan:/dev/ttyNOWHERE", "found no such device"),
         ("serial:/dev/ttyNOWHERE", "found no such device"),
         ("slcan:socket://127.0.0.1:9", "nobody listens there"),

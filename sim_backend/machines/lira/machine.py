@@ -16,6 +16,8 @@ from sim_backend.machines.lira.operator import Attendant
 from sim_backend.machines.lira.params import COILS, ControlParams, Each, PlantParams
 from sim_backend.machines.lira.plant import DQ, TICKS_S, Plant
 from sim_backend.machines.lira.settings import BY_NAME, INJECTED
+from sim_backend.machines.lira.truth_loops import loops
+from sim_backend.motion import Motions
 
 HALVES: Final = range(1, COILS + 1)
 """Coils and half-bridges by their numbers: coil k is driven by half-bridge k."""
@@ -250,6 +252,7 @@ LIRA = Machine(
     controls=frozenset((*BY_NAME, *INJECTED)),
     tick_s=1 / TICKS_S,
     period_s=PERIOD_S,
+    motions=Motions(loops=loops),
     controller=SpokenController,
     served=LineController,
 )
