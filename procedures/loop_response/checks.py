@@ -72,7 +72,7 @@ def _shown(some: Sequence[Taken], axis: str, plan: Plan) -> Iterator[Finding]:
         worst = min(lost, key=lambda t: t.line.size / t.line.u if t.line is not None else 0.0)
         assert worst.line is not None
         text = (f"{len(lost)} lines are lost in noise: {worst.line.size / worst.line.u:.2g} standard uncertainties in the "
-                f"worst, {plan.min_signal:g} wanted. Does {axis}'s channel show this loop? Inject more, or longer.")  # fmt: skip
+                f"worst, {plan.min_signal:g} wanted. Does its channel show this loop? Inject more, or longer.")  # fmt: skip
         names = {"s_max" if t.place == SENSOR else "bandwidth" for t in lost}
         yield Finding(
             "loop-not-shown", text, worst.where, Effect.INDETERMINATE, tuple(f"{n}@{axis}" for n in sorted(names))

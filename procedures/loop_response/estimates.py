@@ -124,10 +124,12 @@ def _tau(rig: RigFile, plan: Plan, axis: str) -> float:
 
 
 def rounding(t: Taken, rig: RigFile) -> float:
-    """Standard uncertainty of |y| by the counts of the reading, as a share of what was injected. A rounding of step q after
-    noise s adds at most (2 q/pi) exp(-2 pi^2 s^2/q^2) |J1(2 pi Y/q)| to a sine of amplitude Y (Widrow and Kollar,
-    Quantization Noise, 2008: the first term of the rounding's series); |J1(x)| < sqrt(2/(pi x)). Its sign goes with Y and with where the loop
-    stands between two counts: another for each line, an arcsine."""
+    """Standard uncertainty of |y| by the counts of the reading, as a share of what was injected.
+
+    A rounding of step q after noise s adds at most (2 q/pi) exp(-2 pi^2 s^2/q^2) |J1(2 pi Y/q)| to a sine of amplitude Y
+    (Widrow and Kollar, Quantization Noise, 2008: the first term of the rounding's series); |J1(x)| < sqrt(2/(pi x)). Its
+    sign goes with Y and with where the loop stands between two counts: another for each line, an arcsine.
+    """
     assert rig.capture is not None
     assert t.line is not None
     q = rig.capture.channels[ability(rig).loops[t.axis].channel].scale

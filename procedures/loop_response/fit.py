@@ -68,7 +68,9 @@ def _without_trend(values: Array, periods: int) -> tuple[complex, Array]:
     """The phasor of so many periods beside a straight line, and what is left of both (n,). Taken off before, a line would take
     a share of up to 6/(pi p)^2 of the sine with it."""
     turn = 2 * np.pi * periods * np.arange(values.size) / values.size
-    fit = linear(np.column_stack([np.cos(turn), np.sin(turn), np.ones_like(turn), np.linspace(-1, 1, values.size)]), values)
+    fit = linear(
+        np.column_stack([np.cos(turn), np.sin(turn), np.ones_like(turn), np.linspace(-1, 1, values.size)]), values
+    )
     return complex(fit.terms[0], -fit.terms[1]), fit.residuals
 
 
@@ -124,14 +126,15 @@ def summit(hz: npt.ArrayLike, size: npt.ArrayLike, u: npt.ArrayLike) -> Point:
     fit, centre = polynomial(hz, size, u, TOP_DEGREE)
     curve = np.polynomial.Polynomial(fit.terms)
     low, high = (float(np.log(f / centre)) for f in (np.min(hz), np.max(hz)))
-    tops = [float(x.real) for x in curve.deriv().roots() if abs(x.imag) < 1e-9 and low < x.real < high]
-    tops = [x for x in tops if curve.deriv(2)(x) < 0]
+    found = [complex(x) for x in curve.deriv().roots()]
+    tops = [x.real for x in found if abs(x.imag) < 1e-9 and low < x.real < high and curve.deriv(2)(x.real) < 0]
     if not tops:
         raise AnalysisError("the sensitivity has no maximum among the lines about it")
-    x = max(tops, key=curve)
-    powers = np.arange(TOP_DEGREE + 1)
-    slopes = np.where(powers > 0, powers * x ** np.maximum(powers - 1.0, 0.0), 0.0)
-    return Point(centre * math.exp(x), math.exp(curve(x)), fit, -slopes / curve.deriv(2)(x), x**powers)
+    x = max(tops, key=lambda at: float(curve(at)))
+    powers = np.array([x**k for k in range(TOP_DEGREE + 1)])
+    slopes = np.array([0.0, *(k * x ** (k - 1) for k in range(1, TOP_DEGREE + 1))])
+    bend = float(curve.deriv(2)(x))
+    return Point(centre * math.exp(x), math.exp(float(curve(x))), fit, -slopes / bend, powers)
 
 
 def falls_at(gain: Callable[[Array], Array], low: float, high: float) -> float:

@@ -19,7 +19,7 @@ PEAK_WITHIN = (0.08, 0.4)  # of the logarithm of the frequency: how far about a 
 
 def survey(plan: Plan) -> list[float]:
     """The lines of a first look, Hz."""
-    return np.geomspace(plan.low_hz, plan.high_hz, plan.lines).tolist()
+    return [float(f) for f in np.geomspace(plan.low_hz, plan.high_hz, plan.lines)]
 
 
 def goes_on(seen: Mapping[float, float]) -> bool:
@@ -52,8 +52,8 @@ def beside(seen: Mapping[float, float]) -> list[float]:
 
 
 def top(seen: Mapping[float, float]) -> tuple[float, float]:
-    """Where the greatest is, by a parabola through it and its neighbours, and how far about it lines should lie, of the logarithm
-    of the frequency: where it has fallen by DOWN. The line itself where it is the first or the last."""
+    """Where the greatest is, by a parabola through it and its neighbours; the line itself where it is the first or the last.
+    And how far about it lines should lie, of the logarithm of the frequency: where it has fallen by DOWN."""
     hz = sorted(seen)
     k = max(range(len(hz)), key=lambda j: seen[hz[j]])
     if not 0 < k < len(hz) - 1:

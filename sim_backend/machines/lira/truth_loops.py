@@ -6,11 +6,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Final
 
 import numpy as np
 
 from bench.rigfile import RigFile
+from sim_backend.core.plant import Array
 from sim_backend.machine import Truth
 from sim_backend.machines.lira.params import PlantParams
 from sim_backend.machines.lira.plant import AXES, POSITION_TICKS, TICKS_S, TRACE, Plant
@@ -61,7 +63,7 @@ class Flying:
                 self.plant.go(axis, value, settings.get(f"rate_{line}", 0.0), settings.get(f"accel_{line}", 0.0))
         self.wait(1.5)
 
-    def wait(self, seconds: float) -> np.ndarray:
+    def wait(self, seconds: float) -> Array:
         """Let it run, a host that lives beside it; rows at 35 kHz."""
         rows, left = [], round(seconds * RATE)
         while left > 0:
@@ -82,7 +84,12 @@ class Flying:
         rows = self.wait(samples / RATE)
         self.plant.set("inject_axis", -1.0)
         turn = np.exp(2j * np.pi * periods * np.arange(samples) / samples)
-        columns = (turn.real, turn.imag, np.ones(samples), np.linspace(-1, 1, samples))  # a trend is no part of the sine
+        columns = (
+            turn.real,
+            turn.imag,
+            np.ones(samples),
+            np.linspace(-1, 1, samples),
+        )  # a trend is no part of the sine
         (a, e), (b, f) = np.linalg.lstsq(np.column_stack(columns), rows[:, [j, WAVE]], rcond=None)[0][:2]
         found = complex(a, -b) / complex(e, -f) / SMALL[axis]
         return abs(1 + found) if place == SENSOR else abs(found)
@@ -98,12 +105,12 @@ def loops(rig: RigFile, drawn: Truth, asked: LoopsAsked) -> dict[tuple[str, str]
     out: dict[tuple[str, str], float] = {}
     for name, settle_s in asked.axes.items():
         axis = AXES_OF_LINE[name]
-        at = _fall(lambda hz, s, a=axis: flying.size(a, REFERENCE, hz, s), asked.low_hz, asked.high_hz, settle_s)
+        at = _fall(partial(flying.size, axis, REFERENCE), asked.low_hz, asked.high_hz, settle_s)
         if at is not None:
             out["bandwidth", name] = at
     for name in asked.sensitive:
         axis = AXES_OF_LINE[name]
-        found = _top(lambda hz, s, a=axis: flying.size(a, SENSOR, hz, s), asked.low_hz, asked.high_hz, asked.axes[name])
+        found = _top(partial(flying.size, axis, SENSOR), asked.low_hz, asked.high_hz, asked.axes[name])
         out["s_max", name], out["s_max_hz", name] = found
     return out
 
