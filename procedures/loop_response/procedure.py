@@ -181,8 +181,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     for axis in chosen(rig, plan):
         for place in (REFERENCE, *([SENSOR] if axis in sensitive(rig, plan) else ())):
             one = sine(rig, plan, axis, place, plan.high_hz, plan.survey_s)
-            if problems := Envelope(rig).problems_of({**plan.parameters, **parameters_of(can, place, one)}):
-                yield f"{axis}, {place}: {'; '.join(problems)}"
+            wanted = {**plan.parameters, **parameters_of(can, place, one)}
+            yield from (f"{axis}, {place}: {problem}" for problem in Envelope(rig).problems_of(wanted))
 
 
 def figures(results: Sequence[Result], recording: Recording[Plan]) -> Iterable[Figure]:
