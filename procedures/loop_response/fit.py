@@ -16,7 +16,7 @@ Array = npt.NDArray[np.float64]
 HALF = math.sqrt(0.5)
 BESIDE = 12  # bins on either side of a line that tell its noise
 LEVEL = math.log(HALF)
-TOP_DEGREE = 4
+FALL_DEGREE, TOP_DEGREE = 3, 4
 
 
 @dataclass(frozen=True)
@@ -100,21 +100,21 @@ def polynomial(hz: npt.ArrayLike, size: npt.ArrayLike, u: npt.ArrayLike, degree:
 
 
 def crossing(hz: npt.ArrayLike, size: npt.ArrayLike, u: npt.ArrayLike) -> Point:
-    """Where the curve falls through -3 dB, 1/sqrt(2), by a parabola, within its lines or at most as far again beyond them.
+    """Where the curve falls through -3 dB, 1/sqrt(2), by a polynomial of degree FALL_DEGREE, among its lines.
 
     Raises:
         AnalysisError: it does not.
     """
-    fit, centre = polynomial(hz, size, u, 2)
-    a, b, c = fit.terms
-    reach = 2 * float(np.abs(np.log(np.asarray(hz) / centre)).max())
-    roots = np.roots([c, b, a - LEVEL])
-    falls = [float(x.real) for x in roots if abs(x.imag) < 1e-12 and abs(x) < reach and b + 2 * c * x.real < 0]
+    fit, centre = polynomial(hz, size, u, FALL_DEGREE)
+    curve = np.polynomial.Polynomial(fit.terms)
+    low, high = (float(np.log(f / centre)) for f in (np.min(hz), np.max(hz)))
+    found = [complex(x) for x in (curve - LEVEL).roots()]
+    falls = [x.real for x in found if abs(x.imag) < 1e-9 and low < x.real < high and curve.deriv()(x.real) < 0]
     if not falls:
         raise AnalysisError("the response does not fall through -3 dB among the lines about it")
-    x = falls[0]
-    terms = np.array([1.0, x, x * x])
-    return Point(centre * math.exp(x), HALF, fit, -terms / (b + 2 * c * x), np.zeros(3))
+    x = max(falls)
+    powers, slope = np.array([x**k for k in range(FALL_DEGREE + 1)]), float(curve.deriv()(x))
+    return Point(centre * math.exp(x), HALF, fit, -powers / slope, np.zeros(powers.size))
 
 
 def summit(hz: npt.ArrayLike, size: npt.ArrayLike, u: npt.ArrayLike) -> Point:

@@ -78,7 +78,7 @@ def _falls(inertia: float, stiffness: float, gains: tuple[float, float, float]) 
 
 
 def misfit(rig: RigFile, plan: Plan, axis: str, shares: npt.ArrayLike) -> float:
-    """By which share a parabola through the ideal curve, at lines that stand `shares` (m,) of its bandwidth, misses that: how
+    """By which share a cubic through the ideal curve, at lines that stand `shares` (m,) of its bandwidth, misses that: how
     much interpolating may be wrong by. 0 where the ideal curve is not told."""
     found, at = numbers(rig, plan, axis), bandwidth(rig, plan, axis)
     if found is None or at is None:

@@ -16,7 +16,10 @@ from procedures.shared.rates import rate_of
 
 USUAL_HZ = 35e3
 SENSOR, REFERENCE = "sensor", "reference"
-RAISED = 6.0  # by which a loop may raise what is added to its reading: more makes it unfit
+RAISED, DAMPED = (
+    6.0,
+    3.0,
+)  # by which a loop may raise what is added to its reading, where its stiffness and its damping count
 BELOW = 0.3  # of the rate of captures, that a line may have
 UNKNOWN_S = 0.1  # of an integrator that the rig file does not tell
 
@@ -82,8 +85,8 @@ def settle_s(rig: RigFile, plan: Plan, axis: str) -> float:
 
 def amplitude(rig: RigFile, plan: Plan, axis: str, place: str, hz: float) -> float:
     """Of a sine, m or rad: what takes `share` of the loop's limit, by its gains, and so many counts at most. With its rate a
-    reference asks for |k_P + k_I/s + s k_D| of itself, less what the loop has followed of it; added to the reading, as much of
-    S times itself, where the derivative is the observer's."""
+    reference asks for |k_P + k_I/s + s k_D| of itself, less what the loop has followed of it; added to the reading, of S
+    times itself, S as much as RAISED where it is slow and DAMPED where it is fast."""
     if axis in plan.amplitude:
         return plan.amplitude[axis]
     loop = ability(rig).loops[axis]
@@ -93,7 +96,8 @@ def amplitude(rig: RigFile, plan: Plan, axis: str, place: str, hz: float) -> flo
     if not limit or not kp or not kd:
         return most
     omega = 2 * math.pi * hz
-    gain = math.hypot(kp * (RAISED if place == SENSOR else 1.0), kd * omega)
+    raised, damped = (RAISED, DAMPED) if place == SENSOR else (1.0, 1.0)
+    gain = math.hypot(raised * kp, damped * kd * omega)
     return min(most, plan.share * limit / gain)
 
 
