@@ -12,6 +12,7 @@ from procedures.loop_response.plan import Plan
 
 FALLEN = 0.5  # of |y/r|: a survey goes on until it is below
 HALVINGS = 3  # of what encloses the -3 dB point
+ACROSS, LEAST = 0.1, 0.03  # of the logarithm of |y/r|, and of the frequency
 BESIDE = 2  # halvings of what is beside the greatest sensitivity
 DOWN = 0.08  # of the logarithm of |S|, by which it is less at the outer lines about its maximum
 PEAK_WITHIN = (0.08, 0.4)  # of the logarithm of the frequency: how far about a maximum lines lie
@@ -34,13 +35,14 @@ def halving(seen: Mapping[float, float]) -> float | None:
     return float(np.sqrt(hz[above[-1]] * hz[above[-1] + 1])) if above else None
 
 
-def fall(seen: Mapping[float, float]) -> float | None:
-    """Where the last fall through -3 dB is, interpolated; None where there is none."""
-    hz = sorted(seen)
-    for one, other in reversed(list(pairwise(hz))):
+def fall(seen: Mapping[float, float], most: float) -> tuple[float, float] | None:
+    """Where the last fall through -3 dB is, interpolated, and how far about it lines should lie, of the logarithm of the
+    frequency: until the response has changed by ACROSS, `most` at most; None where there is no fall."""
+    for one, other in reversed(list(pairwise(sorted(seen)))):
         if seen[one] >= HALF > seen[other]:
-            share = np.log(seen[one] / HALF) / np.log(seen[one] / seen[other])
-            return float(one * (other / one) ** share)
+            steep = np.log(seen[one] / seen[other]) / np.log(other / one)
+            at = one * (seen[one] / HALF) ** (1 / steep)
+            return float(at), float(np.clip(ACROSS / steep, LEAST, most))
     return None
 
 

@@ -17,7 +17,7 @@ class Plan(BenchPlan):
     high_hz: float = Field(1500.0, gt=0)
     lines: int = Field(8, ge=4)  # of the survey, at equal steps of the logarithm
     refined: int = Field(9, ge=5)  # about the -3 dB point, and about the greatest sensitivity
-    within: float = Field(0.15, gt=0, le=0.5)  # so far either way, of the logarithm of the frequency
+    within: float = Field(0.15, gt=0, le=0.5)  # so far either way at most, of the logarithm of the frequency
     share: float = Field(0.35, gt=0, lt=1)  # of a loop's limit, that a sine's force takes at most
     amplitude: dict[str, float] = Field(default_factory=dict)  # m or rad, by loop, in the place of that
     counts: float = Field(16.0, gt=0)  # of the converter that shows the loop, that an amplitude has at most

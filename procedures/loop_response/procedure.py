@@ -126,8 +126,8 @@ def _reference(look: _Look) -> None:
     for _ in range(grid.HALVINGS):
         if (middle := grid.halving(look.seen)) is not None:
             look.take(middle, SURVEY)
-    if (at := grid.fall(look.seen)) is not None:
-        for hz in grid.about(at, look.plan.within, look.plan.refined):
+    if (about := grid.fall(look.seen, look.plan.within)) is not None:
+        for hz in grid.about(*about, look.plan.refined):
             look.take(hz, REFINED)
 
 
