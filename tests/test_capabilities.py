@@ -102,7 +102,11 @@ def test_a_plain_controller_of_schema_1_can_do_what_its_parameters_say() -> None
         ("places = { sensor = 0,", "places = { sensor = 7,", "loop_injection.places.sensor"),
         ("x2 = { value = 1,", "x2 = { value = 0,", "loop_injection.loops.x2.value"),
         ('z = { value = 4, channel = "z"', 'z = { value = 4, channel = "zz"', "loop_injection.loops.z.channel"),
-        ('inertia = "machine/polar_inertia"', 'inertia = "machine/polar"', "loop_injection.loops.gamma.inertia"),
+        (
+            'limit = "sat.r", inertia = "machine/polar_inertia"',
+            'limit = "sat.r", inertia = "machine/polar"',
+            "loop_injection.loops.gamma.inertia",
+        ),
         ('limit = "sat.z"', 'limit = "sat.zz"', "loop_injection.loops.z.limit"),
         (
             '{ channel = "limited", mask = 16 }',
