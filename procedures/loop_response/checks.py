@@ -90,8 +90,8 @@ def of_results(results: Sequence[Result]) -> Iterator[Finding]:
         i = interval(estimate)
         low, high = (_zone(x) for x in (i.low, i.high))
         told = f"zone {low}" if low == high else f"zone {low} or {high}"
-        yield Finding("sensitivity-zone", f"S_max {estimate.value:.2f}: {told} of ISO 14839-3 (A to {ZONES[0]:g}, B to {ZONES[1]:g}, "
-                      f"C to {ZONES[2]:g}).", axis)  # fmt: skip
+        ends = f"A to {ZONES[0]:g}, B to {ZONES[1]:g}, C to {ZONES[2]:g}"
+        yield Finding("sensitivity-zone", f"S_max {estimate.value:.2f}: {told} of ISO 14839-3 ({ends}).", axis)
     if zoned:
         yield Finding("zones-scope", SCOPE)
 
