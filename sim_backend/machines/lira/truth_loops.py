@@ -1,6 +1,5 @@
-"""What the drawn machine's position loops truly do: sines into one loop, all others closed, on the same machine without noise,
-rounding and ripple; and what its noise does to a bandwidth, by a long look at it there: noise drives the inner loops into the
-limits of their currents, and a position loop that is quiet is another one."""
+"""What the drawn machine's position loops truly do: sines into one loop, all others closed, on the same machine
+without noise, rounding and ripple."""
 
 from __future__ import annotations
 
@@ -25,13 +24,11 @@ WAVE: Final = TRACE.index("wave")
 HALF: Final = math.sqrt(0.5)
 BEAT_S: Final = 0.02
 AT_MOST_S: Final = 5.0  # until a lift has gone through its gate
-RADIAL: Final = ("x1", "x2", "y1", "y2")
 SENSOR, REFERENCE = 0.0, 1.0
 GRID, SHORT_S = 12, 0.15  # lines of a first look, and how long each goes on before
 PERIODS = 10
-LOOK_S, BESIDE = 12.0, 1.03  # at a noisy response; a frequency beside another, for a slope
 NEAR: Final = 1e-5  # of a frequency
-SMALL: Final = {**dict.fromkeys(RADIAL, 6e-7), "z": 1.6e-5, "angle": 6e-4}  # m and rad
+SMALL: Final = {"x1": 2e-7, "x2": 2e-7, "y1": 2e-7, "y2": 2e-7, "z": 5e-6, "angle": 1e-4}  # m and rad
 
 
 def quiet(p: PlantParams) -> PlantParams:
@@ -40,20 +37,12 @@ def quiet(p: PlantParams) -> PlantParams:
     return replace(p, **silent)  # type: ignore[arg-type]
 
 
-def unrounded(p: PlantParams) -> PlantParams:
-    """The same machine with the noise of its sensors, which round nothing."""
-    kept = {name: getattr(p, name) for name in ("position_noise", "bridge_noise", "coil_noise", "voltage_noise")}
-    return replace(quiet(p), **kept)
-
-
 class Flying:
     """The drawn machine, lifted, at its place, nothing injected."""
 
-    def __init__(self, drawn: Truth, settings: Mapping[str, float], *, noisy: bool = False) -> None:
+    def __init__(self, drawn: Truth, settings: Mapping[str, float]) -> None:
         built = drawn.plant
-        self.plant = Plant(
-            (unrounded if noisy else quiet)(built.plant), drawn.noise, control=built.control, reduced=built.reduced
-        )
+        self.plant = Plant(quiet(built.plant), control=built.control, reduced=built.reduced)
         self.plant.put(angle=built.rest_angle)
         for name in ("idle", "on"):
             self.plant.command(name)
@@ -84,9 +73,9 @@ class Flying:
             left -= n
         return np.concatenate(rows)
 
-    def size(self, axis: str, place: float, hz: float, settle_s: float, look_s: float = 0.04) -> float:
+    def size(self, axis: str, place: float, hz: float, settle_s: float) -> float:
         """|y/r|, or |S| of a sine that is added to the reading."""
-        periods = max(PERIODS, math.ceil(look_s * hz))
+        periods = max(PERIODS, math.ceil(0.04 * hz))
         samples = round(periods * RATE / hz)
         j, exact = AXES.index(axis), periods * RATE / samples
         for name, value in (("place", place), ("amplitude", SMALL[axis]), ("hz", exact), ("axis", float(j))):
@@ -113,26 +102,17 @@ def loops(rig: RigFile, drawn: Truth, asked: LoopsAsked) -> dict[tuple[str, str]
     if flying.plant.state != "LEVITATED":
         return {}
     flying.go(asked.points, asked.settings)
-    noisy = Flying(drawn, asked.settings, noisy=True)
-    noisy.go(asked.points, asked.settings)
     out: dict[tuple[str, str], float] = {}
     for name, settle_s in asked.axes.items():
         axis = AXES_OF_LINE[name]
         at = _fall(partial(flying.size, axis, REFERENCE), asked.low_hz, asked.high_hz, settle_s)
         if at is not None:
-            out["bandwidth", name] = _with_noise(flying, noisy, axis, at, settle_s)
+            out["bandwidth", name] = at
     for name in asked.sensitive:
         axis = AXES_OF_LINE[name]
         found = _top(partial(flying.size, axis, SENSOR), asked.low_hz, asked.high_hz, asked.axes[name])
         out["s_max", name], out["s_max_hz", name] = found
     return out
-
-
-def _with_noise(flying: Flying, noisy: Flying, axis: str, hz: float, settle_s: float) -> float:
-    """Where the response of the machine with its noise falls through -3 dB, near where that of the quiet one does."""
-    here, above = (math.log(flying.size(axis, REFERENCE, f, settle_s)) for f in (hz, BESIDE * hz))
-    changed = math.log(noisy.size(axis, REFERENCE, hz, settle_s, LOOK_S)) - here
-    return hz * math.exp(-changed * math.log(BESIDE) / (above - here))
 
 
 Size = Callable[[float, float], float]
