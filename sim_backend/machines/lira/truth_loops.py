@@ -44,6 +44,7 @@ class Flying:
         built = drawn.plant
         self.plant = Plant(quiet(built.plant), control=built.control, reduced=built.reduced)
         self.plant.put(angle=built.rest_angle)
+        self.wait(BEAT_S)  # the firmware holds what it has read
         for name in ("idle", "on"):
             self.plant.command(name)
         self.wait(0.2)
