@@ -199,6 +199,20 @@ class CurrentAsked:
 
 
 @dataclass(frozen=True)
+class LoopsAsked:
+    """Sines into position loops: `settings` as those of steps, the set `points` among them; the loops by the names of the
+    machine's line, each with how long a sine goes on before it is looked at, s; those whose sensitivity is asked for; the range
+    of frequencies, Hz."""
+
+    settings: Numbers
+    points: Numbers
+    axes: Numbers
+    sensitive: Sequence[str]
+    low_hz: float
+    high_hz: float
+
+
+@dataclass(frozen=True)
 class Motions:
     """The truths of motion of one machine; None: it has none of that kind. Each takes the rig and what was drawn for it (a
     `Truth`) first.
@@ -209,6 +223,7 @@ class Motions:
         whirl: of the controller's settings, a speed in rad/s and the channels of probes, two for each plane.
         left: unbalance kg m of balancing planes by name, as vectors on their scales, before and after what the operator did.
         passage: of settings, two speeds and channels, curves that know what is `critical` near a speed.
+        loops: bandwidth and greatest sensitivity of position loops, by quantity and loop.
         loop: of settings, the linear loop at rest, as the axes of these names have it, in their order.
         band: what the watched estimator does, by name and line (an empty text where it is none's).
         compare: what estimators do in the loop, by quantity and name, and ratios of two.
@@ -227,6 +242,7 @@ class Motions:
     left: Callable[[RigFile, Any, Sequence[Mapping[str, Any]], Sequence[str]], Sequence[Any]] | None = None
     passage: Callable[[RigFile, Any, Numbers, float, float, Sequence[str]], Any] | None = None
     loop: Callable[[RigFile, Any, Numbers, Sequence[str]], Any] | None = None
+    loops: Callable[[RigFile, Any, LoopsAsked], Mapping[tuple[str, str], float]] | None = None
     peak: Callable[[RigFile, Any, Numbers, int, float], tuple[float, float]] | None = None
     compare: Callable[[RigFile, Any, CompareAsked], Mapping[tuple[str, str], float]] | None = None
     circle: Callable[[RigFile, Any, CircleAsked], Mapping[tuple[str, str], float]] | None = None

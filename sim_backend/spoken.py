@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from bench import units
 from bench.rigfile import RigFile
 from bench.rigfile.binding import COMMANDS, MODES, Binding
-from bench.rigfile.capabilities import Bit, Capabilities
+from bench.rigfile.bit import Bit
+from bench.rigfile.capabilities import Capabilities
 from bench.rigfile.messages import Message, MessageMap
 from sim_backend.machine import Machine
 

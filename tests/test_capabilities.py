@@ -92,3 +92,31 @@ def test_a_plain_controller_of_schema_1_can_do_what_its_parameters_say() -> None
     assert rig.capabilities.angle is not None
     assert rig.capabilities.angle.ref == "angle_ref"
     assert not rig.capabilities.set_points.axes
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key"),
+    [
+        ('axis = "inject_axis"\n', 'axis = "inject_axe"\n', "loop_injection.axis"),
+        ('wave = "wave"\n', 'wave = "waves"\n', "loop_injection.wave"),
+        ("places = { sensor = 0,", "places = { sensor = 7,", "loop_injection.places.sensor"),
+        ("x2 = { value = 1,", "x2 = { value = 0,", "loop_injection.loops.x2.value"),
+        ('z = { value = 4, channel = "z"', 'z = { value = 4, channel = "zz"', "loop_injection.loops.z.channel"),
+        (
+            'limit = "sat.r", inertia = "machine/polar_inertia"',
+            'limit = "sat.r", inertia = "machine/polar"',
+            "loop_injection.loops.gamma.inertia",
+        ),
+        ('limit = "sat.z"', 'limit = "sat.zz"', "loop_injection.loops.z.limit"),
+        (
+            '{ channel = "limited", mask = 16 }',
+            '{ channel = "limit", mask = 16 }',
+            "loop_injection.loops.z.limited.channel",
+        ),
+    ],
+)
+def test_loops_into_which_sines_are_injected(old: str, new: str, key: str) -> None:
+    toml, dbc = (Path("rigs") / "lira.toml").read_text(), (Path("rigs") / "lira.dbc").read_text()
+    assert toml.count(old) == 1
+    found = [p.key for p in problems_of(RigFile.parse(toml.replace(old, new), dbc))]
+    assert f"capabilities.{key}" in found

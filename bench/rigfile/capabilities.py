@@ -11,6 +11,8 @@ from typing import Any, Literal
 
 from pydantic import Field, model_validator
 
+from bench.rigfile.bit import Bit
+from bench.rigfile.capabilities_of_loops import CurrentStep, LoopInjection, Motion
 from bench.rigfile.elements import Name
 from bench.rigfile.part import Part
 from bench.rigfile.toleranced import Toleranced
@@ -69,24 +71,6 @@ class Holding(Part):
     derivative_on_error: str = ""
 
 
-class Motion(Part):
-    """A mover that is sent along and around: parameters of its set points, `place` m and `angle` rad, and of what a move goes
-    by, `*_rate` m/s, rad/s and `*_rise` m/s^2, rad/s^2; channels that show both, and `currents` of the bearings among those of
-    a capture. `gate` m and `gate_time` s: it counts as lifted when every radial probe has read less for so long."""
-
-    place: str
-    place_rate: str = ""
-    place_rise: str = ""
-    place_channel: str
-    angle: str
-    angle_rate: str = ""
-    angle_rise: str = ""
-    angle_channel: str
-    gate: str = ""
-    gate_time: str = ""
-    currents: tuple[str, ...] = ()
-
-
 class Gains(Part):
     """Of the PID that holds each axis: a parameter of all axes, or one by bearing axis. A/m, A/(m s), A s/m."""
 
@@ -135,13 +119,6 @@ class MotorForce(Part):
     circle_hz: str = ""
 
 
-class Bit(Part):
-    """What a channel says: any of the bits of `mask`, or, without one, that it is not zero."""
-
-    channel: str
-    mask: int | None = Field(None, gt=0)
-
-
 class Status(Part):
     """What the controller says of the machine, by its meaning; what it does not say is judged from readings
     (`bench.rigfile.judged`)."""
@@ -151,39 +128,6 @@ class Status(Part):
     voltage_limit: Bit | None = None
     sensor_range: Bit | None = None
     segment_limit: Bit | None = None
-
-
-class CurrentStep(Part):
-    """A current that the controller regulates and steps at once. `parameter`, A, is added to its reference; `along` is the
-    channel of a capture that reads that current, `across` the one beside it, which is to stay; `currents` and `voltages` those
-    of the half-bridges that carry it, before and behind their filters, of a symmetric winding; `supply` that of the DC link,
-    half of which a half-bridge can give. `still`: positions that such a step must leave where they are.
-
-    What the controller has of it: parameters `gain` V/A, the proportional one, and `current_limit` A, of `currents`; what the
-    machine's table states: `inductance` of the winding and `filter_inductance` of a half-bridge, H."""
-
-    parameter: str
-    along: str
-    across: str
-    voltages: tuple[str, ...] = ()
-    currents: tuple[str, ...] = ()
-    supply: str = ""
-    still: tuple[str, ...] = ()
-    gain: str = ""
-    current_limit: str = ""
-    inductance: str = ""
-    filter_inductance: str = ""
-
-    @property
-    def captured(self) -> tuple[str, ...]:
-        """The channels of a capture of a step at full rate."""
-        supply = (self.supply,) if self.supply else ()
-        return (self.along, self.across, *self.voltages, *self.currents, *supply)
-
-    @property
-    def stated(self) -> tuple[str, ...]:
-        """Numbers of `[machine]` that it names."""
-        return tuple(name for name in (self.inductance, self.filter_inductance) if name)
 
 
 class Capabilities(Part):
@@ -196,6 +140,7 @@ class Capabilities(Part):
     set_points: SetPoints = SetPoints()
     path: Path | None = None
     injection: Injection | None = None
+    loop_injection: LoopInjection | None = None
     bias: Mapping[Name, str] = {}
     settings: Mapping[Name, Mapping[Name, Mapping[str, float]]] = {}
     angle: Holding | None = None
@@ -246,6 +191,8 @@ def _tables(c: Capabilities) -> Iterator[tuple[str, str | Mapping[str, str]]]:
         yield from ((f"path.{key}", value) for key, value in path)
     if injection is not None:
         yield from ((f"injection.{key}", value) for key, value in injection if key not in ("axes", "off"))
+    if c.loop_injection is not None:
+        yield from _of_loops(c.loop_injection)
     yield "bias", c.bias
     for kind, names in c.settings.items():
         for name, values in names.items():
@@ -263,6 +210,12 @@ def _tables(c: Capabilities) -> Iterator[tuple[str, str | Mapping[str, str]]]:
     yield "model", c.model
     for key in ("landing_speed", "lift_time", "watchdog", "current_limit"):
         yield key, getattr(c, key)
+
+
+def _of_loops(can: LoopInjection) -> Iterator[tuple[str, str | Mapping[str, str]]]:
+    yield from ((f"loop_injection.{key}", getattr(can, key)) for key in ("axis", "place", "amplitude", "hz"))
+    for name, one in can.loops.items():
+        yield from ((f"loop_injection.loops.{name}.{key}", getattr(one, key)) for key in ("kp", "ki", "kd", "limit"))
 
 
 def is_bound(c: Capabilities, key: str) -> bool:

@@ -6,10 +6,12 @@ from collections.abc import Iterator
 
 from bench import units
 from bench.errors import Problem
-from bench.rigfile.capabilities import Bit, parameters_named
+from bench.rigfile.bit import Bit
+from bench.rigfile.capabilities import parameters_named
 from bench.rigfile.check_current_steps import near
 from bench.rigfile.check_current_steps import problems_of as problems_of_current_steps
 from bench.rigfile.model import RigFile
+from bench.rigfile.places import Places
 
 CODES = ("state", "fault")
 """Channels whose numbers are names, no bits."""
@@ -22,6 +24,7 @@ def problems_of(rig: RigFile) -> Iterator[Problem]:
         *_names(rig),
         *_values(rig),
         *_motion(rig),
+        *_loops(rig),
         *_status(rig),
         *_units(rig),
         *_delay(rig),
@@ -33,7 +36,8 @@ def problems_of(rig: RigFile) -> Iterator[Problem]:
 Line = tuple[str, str, str]
 KINDS = {"set_points.axes": "m", "set_points.slew": "m/s", "set_points.slew_tilt": "rad/s", "path.y": "m", "path.z": "m",
          "path.hz": "Hz", "path.phase": "rad", "path.ramp_s": "s", "injection.amplitude": "A", "injection.hz": "Hz",
-         "injection.step": "Hz", "bias": "A", "angle.ref": "rad", "angle.slew": "rad/s", "angle.speed": "rad/s",
+         "injection.step": "Hz", "loop_injection.hz": "Hz",
+         "bias": "A", "angle.ref": "rad", "angle.slew": "rad/s", "angle.speed": "rad/s",
          "motion.place": "m", "motion.place_rate": "m/s", "motion.place_rise": "m/s^2", "motion.angle": "rad",
          "motion.angle_rate": "rad/s", "motion.angle_rise": "rad/s^2", "motion.gate": "m", "motion.gate_time": "s",
          "motor.phase_slew": "rad/s", "motor.phase_limit": "rad", "motor.circle": "m", "motor.circle_hz": "Hz",
@@ -136,6 +140,39 @@ def _values(rig: RigFile) -> Iterator[Line]:
         for axis, value in (("off", c.injection.off), *c.injection.axes.items()):
             if (first := taken.setdefault(value, axis)) != axis:
                 yield f"injection.axes.{axis}", f"{value:g}", f"a value of its own: it is that of {first}"
+
+
+def _loops(rig: RigFile) -> Iterator[Line]:
+    """What is injected into position loops, and each of these."""
+    can = rig.capabilities.loop_injection
+    if can is None:
+        return
+    yield from _ranged(rig, "loop_injection.off", can.axis, can.off)
+    for place, value in can.places.items():
+        yield from _ranged(rig, f"loop_injection.places.{place}", can.place, value)
+    captured = rig.capture.channels if rig.capture is not None else {}
+    if can.wave and can.wave not in captured:
+        yield "loop_injection.wave", repr(can.wave), f"a channel of captures{near(can.wave, captured)}"
+    taken: dict[float, str] = {can.off: "off"}
+    numbers = Places(rig).known
+    for name, one in can.loops.items():
+        key = f"loop_injection.loops.{name}"
+        yield from _ranged(rig, f"{key}.value", can.axis, one.value)
+        if (first := taken.setdefault(one.value, name)) != name:
+            yield f"{key}.value", f"{one.value:g}", f"a value of its own: it is that of {first}"
+        for told in (rig.channels, captured):
+            if one.channel not in told:
+                yield (
+                    f"{key}.channel",
+                    repr(one.channel),
+                    f"a channel of this file, and of captures{near(one.channel, told)}",
+                )
+        for part in ("inertia", "stiffness"):
+            if (at := getattr(one, part)) and at not in numbers:
+                yield f"{key}.{part}", repr(at), f"the place of a number of this file{near(at, numbers)}"
+        if one.limited is not None and one.limited.channel not in rig.channels:
+            where = one.limited.channel
+            yield f"{key}.limited.channel", repr(where), f"a channel of this file{near(where, rig.channels)}"
 
 
 def _ranged(rig: RigFile, key: str, parameter: str, value: float) -> Iterator[Line]:

@@ -6,7 +6,7 @@ import difflib
 from collections.abc import Collection, Iterator
 
 from bench import units
-from bench.rigfile.capabilities import CurrentStep
+from bench.rigfile.capabilities_of_loops import CurrentStep
 from bench.rigfile.model import RigFile
 
 Line = tuple[str, str, str]

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from bench import units
 from bench.errors import Lacking
 from bench.rigfile import judged
-from bench.rigfile.capabilities import Bit
+from bench.rigfile.bit import Bit
 from bench.rigfile.judged import Judged
 from bench.rigfile.messages import Signal
 from bench.rigfile.model import RigFile

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from bench.errors import AnalysisError
 from bench.rigfile import RigFile
-from bench.rigfile.capabilities import CurrentStep
+from bench.rigfile.capabilities_of_loops import CurrentStep
 from bench.uncertainty import Estimate, Influence
 from procedures.current_step import fit
 from procedures.current_step.fit import Edge

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from bench.errors import AnalysisError, Lacking
 from bench.recording import Recording, Step
 from bench.rigfile import RigFile
-from bench.rigfile.capabilities import CurrentStep
+from bench.rigfile.capabilities_of_loops import CurrentStep
 from procedures.current_step.plan import Plan
 
 Array = npt.NDArray[np.float64]

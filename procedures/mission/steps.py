@@ -11,7 +11,7 @@ import numpy.typing as npt
 from bench.errors import Lacking
 from bench.recording import Recording
 from bench.rigfile import RigFile
-from bench.rigfile.capabilities import Motion
+from bench.rigfile.capabilities_of_loops import Motion
 from procedures.mission.plan import Plan
 
 Array = npt.NDArray[np.float64]

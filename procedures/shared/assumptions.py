@@ -38,6 +38,11 @@ SENSITIVITY = (
     "A bending mode that the plan does not name and that is damped a quarter as much as its mode_damping or less may be missed "
     "by the scan: the gain may rise less than is told, 2.5 times where 5 was told.",
 )
+LOOP_RESPONSE = (
+    "The loop of another place: along the shaft the planes' levers change, and with them what one plane's loop moves. Of a "
+    "mover of 1.34 kg between planes 45 mm off its middle, 1 mm changes the bandwidth of a radial loop by 3 to 4 %.",
+    "The loop of another day: actuators whose constant is 1 % greater change a bandwidth by about 1 %.",
+)
 SPINDOWN = (
     "A constant torque that acts against either direction alike, such as a seal or a brake that drags whatever turns the "
     "rotor, is in T_c with its whole amount.",

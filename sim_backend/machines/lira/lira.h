@@ -53,7 +53,7 @@ typedef struct {
     double coil_dq[10], u_dq[10], bridge_dq[10], u_ref[10], bridge_ref[10], sent_dq[10];
     double ref[6], ref_rate[6], read[6], was[6], sighted[4], filtered[4], run[2], seen[6], seen_rate[6], summed[6], force[6];
     double cos_ra[2], sin_ra[2], cos_la, sin_la; /* firmware's phases at the last reading of the position */
-    double lag[20], contact, phase, injected;
+    double lag[20], contact, phase, wave, injected;
     double zero_c[3], zero_s[3], uneven_c[2], uneven_s[2]; /* of the encoders' zeros (two rotary, linear) and of what is uneven */
     double star[5][216];                     /* exact step: columns of twelve for twelve states, three u_sw, three emfs */
     int32_t member[5][3];                    /* half-bridges of each star */
@@ -78,7 +78,7 @@ void lira_coils(const double *dq, double cos_phase, double sin_phase, double *co
 #define BRIDGES 15
 #define SYSTEMS 5
 #define POLE_PAIRS 8
-#define LIRA_TRACE 69
+#define LIRA_TRACE 70
 #define LIRA_WHOLE (LIRA_TRACE + 3 * BRIDGES + 1)
 #define STEP_S (LIRA_TICK * POSITION_TICKS)
 enum { LIRA_OFF, LIRA_IDLE, LIRA_CURRENT, LIRA_LIFT, LIRA_LEVITATED, LIRA_LANDING, LIRA_FAULT };

@@ -64,6 +64,7 @@ static void tell(const lira_params *p, const lira_state *st, double *out) {
     out[66] = st->injected;
     out[67] = st->mode;
     out[68] = st->fault;
+    out[69] = st->wave;
 }
 
 /* a row of the trace, with the half-bridges' measurements where they are wanted too; how long it is */

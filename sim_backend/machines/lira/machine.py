@@ -15,8 +15,9 @@ from sim_backend.machines.lira.controller import LineController, SpokenControlle
 from sim_backend.machines.lira.operator import Attendant
 from sim_backend.machines.lira.params import COILS, ControlParams, Each, PlantParams
 from sim_backend.machines.lira.plant import DQ, TICKS_S, Plant
-from sim_backend.machines.lira.settings import BY_NAME
+from sim_backend.machines.lira.settings import BY_NAME, INJECTED
 from sim_backend.machines.lira.truth_current_step import currents
+from sim_backend.machines.lira.truth_loops import loops
 from sim_backend.machines.lira.truth_mission import mission
 from sim_backend.motion import Motions
 
@@ -271,10 +272,10 @@ LIRA = Machine(
     copper_W=copper_W,
     operator=operator,
     daily=DAILY,
-    controls=frozenset(BY_NAME) | SENT | {f"step_{name}" for name in DQ},
+    controls=frozenset((*BY_NAME, *INJECTED)) | SENT | {f"step_{name}" for name in DQ},
     tick_s=1 / TICKS_S,
     period_s=PERIOD_S,
-    motions=Motions(mission=mission, currents=currents),
+    motions=Motions(mission=mission, currents=currents, loops=loops),
     controller=SpokenController,
     served=LineController,
 )

@@ -29,11 +29,11 @@ MEASURED: Final = (
 TRACE: Final = (
     *AXES, *(f"true_{n}" for n in AXES), *(f"i_{n}" for n in DQ), *(f"u_{n}" for n in DQ), *(f"f_{n}" for n in DQ),
     *(f"wanted_{n}" for n in DQ), *(f"force_{n}" for n in AXES), *(f"rate_{n}" for n in AXES), "contact", "limited", "injected",
-    "mode", "fault",
+    "mode", "fault", "wave",
 )  # fmt: skip
 """Of one tick: readings, true places of the sensors' targets; as the firmware has them dq coil currents, capacitor voltages,
 inductor currents and references, the forces it wants, the rates it sees; what rings bear, limited loops, what is injected;
-state and fault."""
+state and fault; the injected sine as a share of its amplitude."""
 WHOLE: Final = (*TRACE, *MEASURED[:46])
 """With the half-bridges' measurements and the supply, too."""
 

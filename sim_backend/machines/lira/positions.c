@@ -72,11 +72,12 @@ static INLINE void observe(const lira_control *c, lira_state *st, int j, const g
 /* what is injected at this sample, and its rate */
 static INLINE double injected(const lira_control *c, lira_state *st, double *rate) {
     *rate = 0;
-    st->injected = 0;
+    st->injected = st->wave = 0;
     if (c->inject_axis < 0) return 0;
     st->phase += TWO_PI * c->inject_hz * STEP_S;
     *rate = TWO_PI * c->inject_hz * c->inject_amplitude * cos(st->phase);
-    return st->injected = c->inject_amplitude * sin(st->phase);
+    st->wave = sin(st->phase);
+    return st->injected = c->inject_amplitude * st->wave;
 }
 
 static INLINE double loop(const lira_control *c, lira_state *st, int j, int on, double tone, double tone_rate) {

@@ -64,6 +64,8 @@ SETTINGS: Final = (
     Setting("watchdog_s", "watchdog_s", "s", 0.02, 10),
     Setting("u.dc", "supply_V", "V", 48, 450),
 )
+INJECTED: Final = ("inject_axis", "inject_place", "inject_amplitude", "inject_hz")
+"""What the line's `inj` says, by the names that rig files may have for it."""
 BY_NAME: Final = {s.name: s for s in SETTINGS}
 AXES_OF_LINE: Final = {"x1": "x1", "x2": "x2", "y1": "y1", "y2": "y2", "z": "z", "gamma": "angle"}
 
@@ -93,5 +95,7 @@ def _measurement(column: str) -> Measurement:
 
 INNER: Final = tuple(Measurement(f"i_{name}", f"i_{name}", "A", 1e-3) for name in DQ)
 """The firmware's own dq currents."""
-MEASUREMENTS: Final = (*(_measurement(c) for c in MEASURED), *INNER)
+WAVE: Final = Measurement("wave", "wave", "1", 2**-15)
+"""The sine that is injected, as a share of its amplitude."""
+MEASUREMENTS: Final = (*(_measurement(c) for c in MEASURED), *INNER, WAVE)
 """The 52 and the firmware's own, in the order of a capture's mask, the first one in its lowest bit."""
