@@ -51,6 +51,8 @@ PROCEDURES = (
     _room("sensitivity", "Sensitivity of the control loops by injection, with zones and margins"),
     _room("derivative", "Gain, error and band of an algebraic derivative, by injection"),
     _room("estimator-compare", "Velocity estimators in the loop: errors before, answers to a load"),
+    _room("mission", "Lift, moves along and around at once, landing, on a linear-rotary machine"),
+    _room("current-step", "Step response of the current loops: rise, bands, what goes across"),
     _room("force-map", "Terms of the motor's force over displacement, currents and load"),
 )
 

@@ -24,6 +24,8 @@ RIGS = {
     "amb5dof": ("bearing-model", "step", "tracking", "unbalance", "compensation", "balance", "run-up", "coast-down",
                 "sensitivity"),
     "amb1dof": ("derivative", "estimator-compare"),
+    "lira": ("mission",),
+    "lira-200v": ("current-step",),
     "tsbs6": ("amb-calibration", "torque-constant", "spindown", "angle-step", "slew"),
 }  # fmt: skip
 FOREIGN = {
@@ -58,6 +60,7 @@ ENDS: Mapping[str, tuple[Mapping[str, Any], ...]] = {
     "tracking": ({"laws": ["PID"], "y_m": 20e-6, "z_m": 20e-6},),
     "sensitivity": ({"speeds_rad_s": (10000 * RPM,)},),
     "derivative": ({"degree": 8}, {"degree": 6}),
+    "current-step": ({"steps_at": ("B2_d",)},),
 }
 """Biases, speeds and rates at both ends; choices among words are read from the plans themselves."""
 # a choice that truly touches the rings with the plan's own ellipse, as the procedure's page says: tried with a smaller one

@@ -164,6 +164,41 @@ class SpeedsAsked:
 
 
 @dataclass(frozen=True)
+class MissionAsked:
+    """A mission: `settings` as those of steps. Times from the firmware's start on, s: when it is switched on, `on_s`, and
+    lifts, `lift_s`, from where it is `lying`, m by channel, as probes read it; `commands` (when, "z" or "angle", to where, rate
+    and rise) until `end_s`; `repeats` (begin, end), and `rests` (begin, end, which place). `places` are what both are called,
+    `sent` where the mover is sent, m and rad. The gate, m, and its time, s."""
+
+    settings: Numbers
+    on_s: float
+    lift_s: float
+    lying: Numbers
+    commands: Sequence[tuple[float, str, float, float, float]]
+    end_s: float
+    repeats: Sequence[tuple[float, float]]
+    rests: Sequence[tuple[float, float, int]]
+    places: Sequence[str]
+    sent: Sequence[tuple[float, float]]
+    gate_m: float
+    gate_s: float
+
+
+@dataclass(frozen=True)
+class CurrentAsked:
+    """Steps of currents that the controller regulates, of the machine at rest: by place the current, as the machine calls it,
+    and the proportional gain of its loop, V/A; the `size` of a large step and of a `small` one, A; what of the response counts,
+    s; the `angle` at which the mover was held, rad: it creeps before, and a limit of the half-bridges goes with it."""
+
+    steps: Mapping[str, str]
+    gains: Mapping[str, float]
+    size: float
+    small: float
+    response_s: float
+    angle: float = 0.0
+
+
+@dataclass(frozen=True)
 class Motions:
     """The truths of motion of one machine; None: it has none of that kind. Each takes the rig and what was drawn for it (a
     `Truth`) first.
@@ -181,6 +216,8 @@ class Motions:
         circle: balancing of loads on a circle, by quantity and place.
         angle: what steps of the angle show, by quantity and case.
         drag: what stops the shaft that coasts, by the names of a spindown: B and B_high N m s/rad, T_c N m, J_z kg m^2.
+        mission: largest readings, levels, errors at rest and times of a mission, by quantity and place.
+        currents: what stepped currents do, by quantity and place.
         speeds: at the torque limit, by sharing: `speed` rad/s, `bound` A of the torque current, `ripple` rad/s.
     """
 
@@ -197,6 +234,8 @@ class Motions:
     drag: Callable[[Any, DragAsked], Mapping[str, float]] | None = None
     band: Callable[[RigFile, Any, BandAsked], Mapping[tuple[str, float | None], float]] | None = None
     speeds: Callable[[RigFile, Any, SpeedsAsked], Mapping[str, Mapping[str, float]]] | None = None
+    mission: Callable[[RigFile, Any, MissionAsked], Mapping[tuple[str, str], float]] | None = None
+    currents: Callable[[RigFile, Any, CurrentAsked], Mapping[tuple[str, str], float]] | None = None
 
 
 NONE = Motions()

@@ -207,6 +207,22 @@ def test_echo_prompt_and_events_are_no_replies() -> None:
     assert (host.stream.counts.events, host.stream.counts.dropped) == (1, 1)
 
 
+def test_what_stands_before_the_opening_is_heard_is_nothing_lost() -> None:
+    """Prompts, the echo of the first line and text of its start, as a controller that has just started says them."""
+    host = Host()
+    first, second, third = host.stream.opening().decode().strip().split("\n")
+    host.hear(f"\r\nlira> \r\nlira> {first}\r\n".encode() + b"lira> " + reply(f"{first.split()[0]} ok off"))
+    assert host.stream.counts.dropped == 0
+    host.hear(f"{second[1:]}\r\n{third}x\r\n".encode())
+    assert host.stream.counts.dropped == 2
+    host.hear(b"lira firmware 1.0\r\n! 0 boot power\r\nlira> lira firmware 1.0\r\n")
+    again = host.stream.due().decode().strip().split("\n")[0]
+    host.hear(f"\r\nlira> {again}\r\n".encode())
+    assert (host.stream.counts.dropped, host.stream.counts.restarts) == (2, 3)
+    host.hear(f"{first}\r\n".encode())
+    assert host.stream.counts.dropped == 3  # that opening is over
+
+
 @given(
     st.lists(
         st.binary(max_size=80)

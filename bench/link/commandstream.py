@@ -19,7 +19,7 @@ from bench.link.spoken import Said, Speaker
 from bench.rigfile import RigFile
 from bench.rigfile.commandline import COUNTED, CommandLine
 from bench.wire.captureblock import Block, pieces
-from bench.wire.commandline import TAGS, Event, Reply, Splitter, beat, read_line, request
+from bench.wire.commandline import TAGS, Event, Reply, Splitter, beat, read_line, request, without_prompt
 
 SEQUENCE_BYTES = 2
 _VALUE = re.compile(r"=\s*([-+0-9.eE]+|nan|inf|-inf)")
@@ -30,7 +30,9 @@ _log = logging.getLogger("bench.commandline")
 class Counts:
     """What went wrong on the line, or was told beside."""
 
-    dropped: int = 0  # lines that are neither reply nor event
+    dropped: int = (
+        0  # lines that are neither reply nor event, nor a prompt, text of its start or an echo of the opening
+    )
     late: int = 0  # replies that nobody waited for
     damaged: int = 0  # blocks whose CRC is not theirs, or that cannot be a message
     events: int = 0
@@ -63,13 +65,16 @@ class CommandStream:
         self._lock = threading.Lock()  # one thread sends, another receives
         self._last = b""  # telemetry
         self._due = b""
+        self._echoes: set[str] = set()  # of the opening, which a controller that has just started says after us
         self.counts = Counts()
         self.simulated = False
         """Whether the controller says that it is a simulation."""
 
     def opening(self) -> bytes:
         """What is said first: whatever waits in the controller's line is ended, then the rig file's lines, without waiting."""
-        return b"\n\n" + b"".join(request(self._next(), *line.split()) for line in self._lines.opening)
+        lines = [request(self._next(), *line.split()) for line in self._lines.opening]
+        self._echoes = {line.decode("ascii").strip() for line in lines}
+        return b"\n\n" + b"".join(lines)
 
     def due(self) -> bytes:
         """What is to be said unasked, once: the opening, after a restart."""
@@ -136,8 +141,10 @@ class CommandStream:
             self._restarted(found.name in self._lines.restart)
             return []
         if found is None:
-            self.counts.dropped += bool(text.strip())
-            self._restarted(any(text.strip().startswith(x) for x in self._lines.restart))
+            bare = without_prompt(text, self._lines.prompt)
+            restart = any(bare.startswith(x) for x in self._lines.restart)
+            self.counts.dropped += bool(bare) and not restart and bare not in self._echoes
+            self._restarted(restart)
             return []
         if found.tag is None or found.kind == "more":
             return []

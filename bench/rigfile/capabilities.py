@@ -69,6 +69,24 @@ class Holding(Part):
     derivative_on_error: str = ""
 
 
+class Motion(Part):
+    """A mover that is sent along and around: parameters of its set points, `place` m and `angle` rad, and of what a move goes
+    by, `*_rate` m/s, rad/s and `*_rise` m/s^2, rad/s^2; channels that show both, and `currents` of the bearings among those of
+    a capture. `gate` m and `gate_time` s: it counts as lifted when every radial probe has read less for so long."""
+
+    place: str
+    place_rate: str = ""
+    place_rise: str = ""
+    place_channel: str
+    angle: str
+    angle_rate: str = ""
+    angle_rise: str = ""
+    angle_channel: str
+    gate: str = ""
+    gate_time: str = ""
+    currents: tuple[str, ...] = ()
+
+
 class Gains(Part):
     """Of the PID that holds each axis: a parameter of all axes, or one by bearing axis. A/m, A/(m s), A s/m."""
 
@@ -135,6 +153,39 @@ class Status(Part):
     segment_limit: Bit | None = None
 
 
+class CurrentStep(Part):
+    """A current that the controller regulates and steps at once. `parameter`, A, is added to its reference; `along` is the
+    channel of a capture that reads that current, `across` the one beside it, which is to stay; `currents` and `voltages` those
+    of the half-bridges that carry it, before and behind their filters, of a symmetric winding; `supply` that of the DC link,
+    half of which a half-bridge can give. `still`: positions that such a step must leave where they are.
+
+    What the controller has of it: parameters `gain` V/A, the proportional one, and `current_limit` A, of `currents`; what the
+    machine's table states: `inductance` of the winding and `filter_inductance` of a half-bridge, H."""
+
+    parameter: str
+    along: str
+    across: str
+    voltages: tuple[str, ...] = ()
+    currents: tuple[str, ...] = ()
+    supply: str = ""
+    still: tuple[str, ...] = ()
+    gain: str = ""
+    current_limit: str = ""
+    inductance: str = ""
+    filter_inductance: str = ""
+
+    @property
+    def captured(self) -> tuple[str, ...]:
+        """The channels of a capture of a step at full rate."""
+        supply = (self.supply,) if self.supply else ()
+        return (self.along, self.across, *self.voltages, *self.currents, *supply)
+
+    @property
+    def stated(self) -> tuple[str, ...]:
+        """Numbers of `[machine]` that it names."""
+        return tuple(name for name in (self.inductance, self.filter_inductance) if name)
+
+
 class Capabilities(Part):
     """`bias` is by bearing; `settings` are by kind and name: the parameters that choose it; of kind "law" the first is what a
     lift and a stop go by, unless "lift" says more. `gains` are of the
@@ -148,10 +199,12 @@ class Capabilities(Part):
     bias: Mapping[Name, str] = {}
     settings: Mapping[Name, Mapping[Name, Mapping[str, float]]] = {}
     angle: Holding | None = None
+    motion: Motion | None = None
     motor: MotorForce = MotorForce()
     gains: Gains = Gains()
     flatness: Mapping[Name, Flatness] = {}
     status: Status = Status()
+    current_steps: Mapping[Name, CurrentStep] = {}
     model: Mapping[Name, str] = {}
     landing_speed: str = ""
     lift_time: str = ""
@@ -169,6 +222,11 @@ class Capabilities(Part):
         told = {"value": value, "unit": "s", "half_width": abs(value) / 10, "distribution": "rectangular",
                 "source": "capabilities.loop_delay_s, which states no tolerance: a tenth of it"}  # fmt: skip
         return {**{key: of for key, of in data.items() if key != "loop_delay_s"}, "loop_delay": told}
+
+
+MOVED = ("place", "place_rate", "place_rise", "angle", "angle_rate", "angle_rise", "gate", "gate_time")
+"""Keys of a motion that are parameters."""
+STEP_PARAMETERS = ("parameter", "gain", "current_limit")
 
 
 def parameters_named(c: Capabilities) -> Iterator[tuple[str, str]]:
@@ -194,10 +252,14 @@ def _tables(c: Capabilities) -> Iterator[tuple[str, str | Mapping[str, str]]]:
             yield f"settings.{kind}.{name}", {parameter: parameter for parameter in values}
     if angle is not None:
         yield from ((f"angle.{key}", value) for key, value in angle)
+    if c.motion is not None:
+        yield from ((f"motion.{key}", getattr(c.motion, key)) for key in MOVED)
     yield from ((f"motor.{key}", value) for key, value in c.motor)
     yield from ((f"gains.{key}", value) for key, value in c.gains)
     for law, flat in c.flatness.items():
         yield from ((f"flatness.{law}.{key}", value) for key, value in flat)
+    for place, step in c.current_steps.items():
+        yield f"current_steps.{place}", {k: v for k in STEP_PARAMETERS if (v := getattr(step, k))}
     yield "model", c.model
     for key in ("landing_speed", "lift_time", "watchdog", "current_limit"):
         yield key, getattr(c, key)

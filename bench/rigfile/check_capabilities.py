@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 
 from bench import units
 from bench.errors import Problem
 from bench.rigfile.capabilities import Bit, parameters_named
+from bench.rigfile.check_current_steps import near
+from bench.rigfile.check_current_steps import problems_of as problems_of_current_steps
 from bench.rigfile.model import RigFile
 
 CODES = ("state", "fault")
@@ -20,10 +21,12 @@ def problems_of(rig: RigFile) -> Iterator[Problem]:
         *_parameters(rig),
         *_names(rig),
         *_values(rig),
+        *_motion(rig),
         *_status(rig),
         *_units(rig),
         *_delay(rig),
         *_angle(rig),
+        *problems_of_current_steps(rig),
     ):
         yield Problem(rig.path, f"capabilities.{key}", found, expected)
 
@@ -35,6 +38,8 @@ SPEED_ALONE = (
 KINDS = {"set_points.axes": "m", "set_points.slew": "m/s", "set_points.slew_tilt": "rad/s", "path.y": "m", "path.z": "m",
          "path.hz": "Hz", "path.phase": "rad", "path.ramp_s": "s", "injection.amplitude": "A", "injection.hz": "Hz",
          "injection.step": "Hz", "bias": "A", "angle.ref": "rad", "angle.slew": "rad/s", "angle.speed": "rad/s",
+         "motion.place": "m", "motion.place_rate": "m/s", "motion.place_rise": "m/s^2", "motion.angle": "rad",
+         "motion.angle_rate": "rad/s", "motion.angle_rise": "rad/s^2", "motion.gate": "m", "motion.gate_time": "s",
          "motor.phase_slew": "rad/s", "motor.phase_limit": "rad", "motor.circle": "m", "motor.circle_hz": "Hz",
          "current_limit": "A", "landing_speed": "rad/s", "lift_time": "s", "watchdog": "s"}  # fmt: skip
 COORDINATES = {"x": "m", "y": "m", "z": "m", "psi": "rad", "theta": "rad"}
@@ -85,6 +90,25 @@ def _names(rig: RigFile) -> Iterator[Line]:
             if name not in known:
                 what = "an axis" if known is axes else "a bearing" if known is rig.bearings else "a ring"
                 yield f"{key}.{name}", name, f"{what} of this file: {', '.join(known) or '(there is none)'}"
+
+
+def _motion(rig: RigFile) -> Iterator[Line]:
+    """Channels that show where the mover is, and what its bearings carry."""
+    motion = rig.capabilities.motion
+    if motion is None:
+        return
+    captured = {} if rig.capture is None else rig.capture.channels
+    for key, name, si in (
+        ("place_channel", motion.place_channel, "m"),
+        ("angle_channel", motion.angle_channel, "rad"),
+    ):
+        if name not in rig.channels:
+            yield f"motion.{key}", repr(name), f"a channel of this file{near(name, rig.channels)}"
+        elif units.UNITS.get(unit := rig.channels[name].unit, units.UNITS["1"]).si != si:
+            yield f"motion.{key}", f"{name}, in {unit}", f"a channel in {si}"
+    for name in motion.currents:
+        if name not in captured:
+            yield "motion.currents", repr(name), f"a channel of [capture.channels]{near(name, captured)}"
 
 
 def _stops(rig: RigFile) -> tuple[str, ...]:
@@ -142,9 +166,3 @@ def _status(rig: RigFile) -> Iterator[Line]:
             yield f"{key}.channel", f"{bit.channel}, in {rig.channels[bit.channel].unit}", "a channel of bits, in 1"
         if (first := taken.setdefault((bit.channel, bit.mask), key)) != key:
             yield key, f"{bit.channel}, mask {bit.mask}", f"a bit of its own: it is that of {first}"
-
-
-def near(name: str, known: Collection[str]) -> str:
-    """The nearest of the names that there are, for a message."""
-    close = difflib.get_close_matches(name, known, 1)
-    return f", such as {close[0]}" if close else ""

@@ -52,7 +52,8 @@ def problems_of(rig: RigFile) -> Iterator[Problem]:
         needed |= MOTOR_GEOMETRY if any("rotation" in d.roles for d in rig.devices.values()) else {}
     for key in sorted(needed.keys() - g.keys()):
         yield Problem(rig.path, f"geometry.{key}", "nothing", f"{needed[key]}, with its certificate")
-    used = references_in(rig)
+    stepped = rig.capabilities.current_steps.values()
+    used = references_in(rig) | {f"machine/{name}" for step in stepped for name in step.stated}
     for key in sorted(rig.machine.keys() - MACHINE.keys()):
         if f"machine/{key}" not in used:
             yield Problem(rig.path, f"machine.{key}", "a number nobody asks for", f"one of {', '.join(MACHINE)}")

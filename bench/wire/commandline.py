@@ -105,10 +105,7 @@ def read_line(text: str, prompt: str = "") -> Reply | Event | None:
     Returns:
         None for what is neither reply nor event (an echo, text of its start), and where the checksum is wrong.
     """
-    text = text.strip()
-    while prompt and text.startswith(prompt.strip()):
-        text = text.removeprefix(prompt.strip()).lstrip()
-    plain, checked = _plain(text)
+    plain, checked = _plain(without_prompt(text, prompt))
     if plain is None:
         return None
     if found := _EVENT.fullmatch(plain):
@@ -117,6 +114,14 @@ def read_line(text: str, prompt: str = "") -> Reply | Event | None:
         kind: Kind = "ok" if found[2] == "ok" else "err" if found[2] == "err" else "more"
         return Reply(None if found[1] == "-" else int(found[1]), kind, found[3] or "", checked)
     return None
+
+
+def without_prompt(text: str, prompt: str) -> str:
+    """A line without prompts before it."""
+    text = text.strip()
+    while prompt and text.startswith(prompt.strip()):
+        text = text.removeprefix(prompt.strip()).lstrip()
+    return text
 
 
 def read_request(text: str) -> Request | None:

@@ -22,7 +22,7 @@ from procedures.angle_step.budget import OUTBOARD, at_motor, gained, within
 from procedures.angle_step.fine import Fine, fine
 from procedures.angle_step.paths import Peak, peak_of
 from procedures.angle_step.response import Response
-from procedures.angle_step.standing import stands
+from procedures.angle_step.standing import EACH, stands
 from procedures.angle_step.steps import Case, Done
 from procedures.angle_step.trend import noise
 from procedures.servomotor.conventions import conventions
@@ -32,7 +32,6 @@ Array = npt.NDArray[np.float64]
 WAYS = (True, False)  # to the angle, and back
 TICKS = 0.1  # of a tick: a crossing, where steps that are alike meet the same ticks
 BETWEEN = 0.009  # of a count: what a turning point is off in all steps of one way (simulated swings)
-EACH = 0.008  # of a count: what it is off in one step
 
 
 def by_case(
@@ -68,11 +67,19 @@ def _estimates(
     between = _read(f"edges/{where}", "encoder between its counts", BETWEEN * count, "rad")
     crossings = _read(f"ticks/{where}", "sampling", tick * TICKS, "s")
     tops = _ways(found, [f.overshoot for f in found])
-    overshoot, (top, dof) = _learned(f"overshoot/{where}", "1", tops), noise(tops)
-    rise = _learned(f"rise_time/{where}", "s", _ways(found, [f.rise for f in found]))
+    starts = _ways(found, [f.began.edge for f in found])
+    higher = (
+        -float(np.mean(tops)) * count / case.size
+    )  # by a start that is a count further: the step is smaller by that
+    longer = float(np.mean([f.longer for f in found])) * count
+    loose = _loose(where, found)
+    top, dof = noise(tops, starts, higher)
+    rises = _ways(found, [f.rise for f in found])
     out = {
-        "rise_time": rise + crossings * math.sqrt(2),
-        "overshoot": overshoot + between * (1 / case.size),
+        "rise_time": _repeated(f"rise_time/{where}", "s", rises, *noise(rises, starts, longer))
+        + crossings * math.sqrt(2) + _in(loose * longer, "s"),
+        "overshoot": _repeated(f"overshoot/{where}", "1", tops, top, dof)
+        + between * (1 / case.size) + _in(loose * higher, "1"),
         "settling_time": _settling(where, found, (top * case.size, dof), count) + crossings,
         "final_error": _final(where, found, done, count, kp),
         **_peaks(where, found, done, rig),
@@ -86,11 +93,27 @@ def _estimates(
     return out
 
 
+def _loose(where: str, found: Sequence[Fine]) -> Estimate:
+    """Zero, with what chance does to the mean start, counts: one that is loose may be anywhere between two edges."""
+    u = math.sqrt(sum(f.began.loose for f in found) / 12) / len(found)
+    influence = Influence(id=f"start/{where}", name="at which edge a step begins", u=u, unit="1", kind="B",
+                          distribution="normal")  # fmt: skip
+    return Estimate.of(0.0, influence)
+
+
+def _in(estimate: Estimate, unit: str) -> Estimate:
+    """The same in a unit, which a factor has brought."""
+    return Estimate(estimate.value, unit, estimate.sensitivities)
+
+
 def _settling(where: str, found: Sequence[Fine], top: tuple[float, int], count: float) -> Estimate:
-    """The mean over the steps, and over what their angles may be off; `top`: what noise does to a turning point, rad, and the
-    degrees of freedom by which it may be more. A swing that ends near the band leaves it in one step and not in the next: what
-    is told is how often, which jumps nowhere."""
-    each = np.array([f.settlings(math.hypot(top[0], EACH * count), top[1]) for f in found])
+    """The mean over the steps, and over what their angles may be off; `top`: what noise does to a turning point as it is read,
+    rad, and the degrees of freedom by which it may be more. A start that is a count further makes all swings smaller as it
+    does the step, one at the band by that share of the band. A swing that ends near it leaves it in one step and not in the
+    next: what is told is how often, which jumps nowhere."""
+    noisy = max(top[0], EACH * count)
+    off = [math.hypot(noisy, f.band * count / f.size / math.sqrt(12) if f.began.loose else 0.0) for f in found]
+    each = np.array([f.settlings(by, top[1]) for f, by in zip(found, off, strict=True)])
     alike = np.array([f.settlings(BETWEEN * count) for f in found])
     chance = Influence(id=f"scatter/settling_time/{where}", name="whether a swing leaves the band", unit="s", kind="B",
                        u=math.sqrt(float(each.var(axis=1).sum())) / len(found), distribution="normal")  # fmt: skip
@@ -155,12 +178,9 @@ def _scattered(identity: str, unit: str, ways: Sequence[Sequence[float] | Array]
     return _repeated(identity, unit, parts, s, dof)
 
 
-def _learned(identity: str, unit: str, ways: Sequence[Sequence[float]]) -> Estimate:
-    """Mean over both ways, with what the steps of each are off their trend."""
-    return _repeated(identity, unit, [np.asarray(p, float) for p in ways], *noise(ways))
-
-
-def _repeated(identity: str, unit: str, parts: Sequence[Array], s: float, dof: int) -> Estimate:
+def _repeated(identity: str, unit: str, ways: Sequence[Sequence[float] | Array], s: float, dof: int) -> Estimate:
+    """Mean over both ways, each step of which has noise `s`."""
+    parts = [np.asarray(p, float) for p in ways]
     u = s * math.sqrt(sum(1 / len(p) for p in parts)) / len(parts)
     influence = Influence(id=f"scatter/{identity}", name="scatter of the repeats", u=u, unit=unit, kind="A",
                           distribution="normal", dof=float(dof), source=f"{sum(map(len, parts))} steps")  # fmt: skip

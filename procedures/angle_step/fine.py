@@ -12,19 +12,21 @@ import numpy.typing as npt
 from procedures.angle_step.bounds import Swing
 from procedures.angle_step.course import Course, course
 from procedures.angle_step.edges import edges
+from procedures.angle_step.standing import Began, began
 from procedures.angle_step.steps import Done
 
 Array = npt.NDArray[np.float64]
 ANSWERS = 0.5  # of its greatest: the torque current that answers a step
 SWING_S = 5e-3  # a swing that ends near the band leaves it or does not: a jump of more
+NEAR = 0.1  # of the rise: about a crossing, for the speed there
 QUANTILES = 41  # by which an angle that is unsure may be off
 
 
 @dataclass(frozen=True)
 class Fine:
     """Of one step, `forward` or back: rise and settling s, overshoot as a share; how long an amplifier cut its demand, s, where
-    the law tells; the `course` of the angle from where it began, its `size` and the `band` of settling, rad; and the tick at
-    which the torque current `answers`."""
+    the law tells; the `course` of the angle from where it began, its `size` and the `band` of settling, rad; the tick at
+    which the torque current `answers`; and at which edge the rotor stood before, `began`."""
 
     forward: bool
     rise: float
@@ -35,6 +37,17 @@ class Fine:
     size: float
     band: float
     answers: int
+    began: Began
+
+    @property
+    def longer(self) -> float:
+        """By how much a start that is further on makes the rise longer, s/rad, if the loop is linear: what is left of it when
+        the angle passes 10 % is 0.9, and 0.1 at 90 %."""
+        t, y = self.course.t, self.course.y
+        low, high = (self.course.crossing(share * self.size) for share in (0.1, 0.9))
+        near = (high - low) * NEAR
+        slow, fast = (float(np.interp(at + near, t, y) - np.interp(at - near, t, y)) / (2 * near) for at in (low, high))
+        return 0.9 / slow - 0.1 / fast
 
     def settlings(self, unsure: float, dof: float = 1e6) -> Array:
         """The settling time, s, by angles that are off by so much, rad, times the quantiles of t: where a swing ends within
@@ -64,7 +77,7 @@ def fine(done: Done, swing: Swing, settling: float, band: float, count: float) -
         settling=angle.last_outside(size, band) - float(swing.t[answers]),
         overshoot=max(angle.top / size - 1, 0.0),
         saturated=swing.cut,
-        course=angle, size=size, band=band, answers=answers,
+        course=angle, size=size, band=band, answers=answers, began=began(done, swing.angle[: answers + 1], count),
     )  # fmt: skip
 
 

@@ -127,3 +127,19 @@ BALANCE = (
 LOAD_BALANCING = (
     "Segment current sensors whose readings bend: 0.1 % of 10 A at 7 A and nothing at 5 A changes the reduction by 0.1 points.",
 )
+MISSION = (
+    "Readings are not the shaft's axis: integrators bring each reading back to zero, and a target that is not round moves the "
+    "axis instead, by as much as it is out of round, 25 µm for 20 µm of runout at both places together. No probe here sees it; "
+    "level_difference is of readings.",
+    "Distances count from each probe's own zero, not from the middle of the rings: a zero that is 5 µm off brings the mover "
+    "5 µm nearer to one side and changes no result.",
+    "What happens while a capture is uploaded, the mover held where it is, is in no result.",
+)
+CURRENT_STEP = (
+    "Currents are as the controller's own sensors read them. One gain for all of them cancels in every quantity; gains that "
+    "differ by 0.5 % between two coils turn 0.1 % of the step across.",
+    "Time is the controller's: a clock that is fast by 1e-4 makes rise times shorter and bands wider by that share.",
+    "Phases that are exchanged alike in the winding and in the controller's count, or an encoder whose zero is off: at "
+    "standstill the currents are the same to the last digit. The order of the phases and the zeros are other tests'.",
+    "A coil of the linear winding that is reversed and stands where its current gives no force: it pushes nothing there.",
+)

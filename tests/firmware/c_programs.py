@@ -25,6 +25,13 @@ def firmware(folder: Path) -> Path:
     return made
 
 
+def line(folder: Path) -> Path:
+    """The controller with a command line, written from the page of its protocol alone."""
+    made = folder / "line"
+    _compile("-o", str(made), *(str(path) for path in sorted((HERE / "line").glob("*.c"))), "-lm")
+    return made
+
+
 def mischief(folder: Path) -> Path:
     """The same controller with a plant that carries masses, and with misbehaviours."""
     made, controller = folder / "mischief", folder / "controller.o"

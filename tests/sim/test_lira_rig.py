@@ -31,7 +31,7 @@ MOVES = {
     "bearing_constant_1": "bearing_constant", "bearing_constant_2": "bearing_constant", "middle": "middle",
     "pair_pitch": "pair_pitch", "cogging_force": "cogging_force", "cogging_force_2": "cogging_force_2",
     "cogging_torque": "cogging_torque", "coil_resistance_rot": "coil_r", "coil_resistance_lin": "coil_r",
-    "coil_inductance_rot": "coil_l", "coil_inductance_lin": "coil_l", "filter_capacitance": "filter_c damper_c",
+    "machine.inductance_rot": "coil_l", "machine.inductance_lin": "coil_l", "filter_capacitance": "filter_c damper_c",
     "supply": "supply", "zero_ra1": "zero_ra", "zero_ra2": "zero_ra", "zero_la": "zero_la",
     "magnet_runout_1": "uneven", "magnet_runout_2": "uneven", "magnet_phase_1": "uneven_phase",
     "magnet_phase_2": "uneven_phase", "target_runout": "runout", "target_phase": "runout_phase", "eccentric_x": "eccentric",

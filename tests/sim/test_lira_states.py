@@ -92,6 +92,17 @@ def test_a_silent_host_is_landed_within_the_watchdog() -> None:
     assert (plant.state, plant.fault) == ("FAULT", "HEARTBEAT_LOST")
 
 
+def test_a_stop_while_a_silent_host_is_landed_keeps_the_fault() -> None:
+    plant = lifted().plant
+    plant.beat()
+    plant.run(0.1)
+    assert (plant.state, plant.fault) == ("LANDING", "HEARTBEAT_LOST")
+    assert plant.command("stop") == 0
+    assert (plant.state, plant.fault) == ("FAULT", "HEARTBEAT_LOST")
+    assert plant.command("clear") == 0
+    assert (plant.state, plant.fault) == ("IDLE", "NONE")
+
+
 def test_what_is_lost_trips_within_a_millisecond_and_is_cleared_by_a_command() -> None:
     plant = lifted().plant
     plant.push(np.array([60.0, 0, 0, 0, 0, 0]))

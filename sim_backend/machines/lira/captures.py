@@ -59,8 +59,8 @@ class Captures:
             raise Refused(3, f"mask of {len(MEASUREMENTS)} channels, 35000|140000|280000, before < length")
         if (rate > 35_000 and len(channels) > FAST) or 2 * len(channels) * length > MEMORY:
             raise Refused(3, f"{FAST} channels above 35000 Hz, {MEMORY} bytes")
-        self._count += 1
-        capture = Capture(self._count & 0xFFFF, channels, EVERY[rate], length, before, words[4])
+        self._count = self._count % 0xFFFE + 1  # never that of telemetry, nor 0
+        capture = Capture(self._count, channels, EVERY[rate], length, before, words[4])
         if words[4] == "level":
             names = [MEASUREMENTS[k].name for k in channels]
             if words[5] not in names:

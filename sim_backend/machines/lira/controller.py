@@ -15,6 +15,7 @@ from sim_backend.machine import Truth
 from sim_backend.machines.lira.device import Device
 from sim_backend.machines.lira.linefaults import KINDS, LineFaults
 from sim_backend.machines.lira.plant import TICKS_S
+from sim_backend.machines.lira.settings import SETTINGS
 from sim_backend.machines.lira.uart import Uart
 from sim_backend.octets import BYTES, framed, unframed
 
@@ -49,6 +50,9 @@ class LineController:
         self.truth = truth
         self.plant: Any
         self.plant = truth.machine.make(truth.plant, truth.noise, substeps)
+        for s in SETTINGS:  # as delivered
+            if s.name in rig.parameters:
+                self.plant.set(s.field, rig.parameters[s.name].default)
         self.device = Device(self.plant)
         url = linkurl.parse(rig.link.url)
         baud = int(url.query["baudrate"]) if url.query.get("baudrate", "").isdigit() else FASTEST

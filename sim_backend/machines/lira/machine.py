@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 from bench.errors import ConfigError
@@ -16,6 +16,9 @@ from sim_backend.machines.lira.operator import Attendant
 from sim_backend.machines.lira.params import COILS, ControlParams, Each, PlantParams
 from sim_backend.machines.lira.plant import DQ, TICKS_S, Plant
 from sim_backend.machines.lira.settings import BY_NAME
+from sim_backend.machines.lira.truth_current_step import currents
+from sim_backend.machines.lira.truth_mission import mission
+from sim_backend.motion import Motions
 
 HALVES: Final = range(1, COILS + 1)
 """Coils and half-bridges by their numbers: coil k is driven by half-bridge k."""
@@ -29,17 +32,34 @@ EACH: Final = {
 """Numbers that the rig file states once and each coil or half-bridge has of its own: what their draws' names end in."""
 EXCHANGED: Final = ((1, 5), (2, 4))
 """Places among six half-bridges of phases b and c of both systems."""
+SENT: Final = frozenset(f"ref_{name}" for name in (*RADIAL, "z", "gamma")) | frozenset(
+    f"{what}_{name}" for what in ("rate", "accel") for name in ("z", "gamma")
+)
+"""Set points and what a move goes by, which the command line hears with verbs of their own."""
 DEFECTS = {
     "drop_fraction": 0.0, "dead_after_s": 0.0, "fault_after_s": 0.0, "drive_fault_after_s": 0.0, "integrator_factor": 1.0,
     "coil_reversed": 0.0, "exchange_phases": 0.0, "exchange_actuators": 0.0, "zero_off_ra": 0.0, "zero_off_la": 0.0,
     "one_zero": 0.0, "adc_late_s": 0.0, "no_pull": 0.0, "position_sign_x1": 1.0, "position_sign_y1": 1.0,
+    "factor_kp_s": 1.0, "factor_kp_sl": 1.0, "factor_kp_v": 1.0, "factor_current_max": 1.0, "capacitance_factor": 1.0,
 }  # fmt: skip
 """Planted defects and their harmless values. `coil_reversed`: number of the coil that is connected the other way round;
 `exchange_phases`: b and c of rotary actuator 1 or 2, or of both (3), exchanged at the terminals; `exchange_actuators`: 1, the
 half-bridges of one drive the other; `zero_off_*` rad electrical: encoder turned or moved after its zero was set; `one_zero`: 1,
 the firmware takes the zero of the first rotary actuator for both; `adc_late_s`: of the half-bridges' readings; `no_pull`: 1,
-the observers do not know the negative stiffness; `position_sign_*`: of a probe."""
-ELECTRICAL: Final = ("coil_reversed", "exchange_phases", "exchange_actuators", "adc_late_s")
+the observers do not know the negative stiffness; `position_sign_*`: of a probe; `factor_*`: what the firmware has of
+a gain or a limit that it was told; `capacitance_factor`: of every capacitor, beside what it was drawn with."""
+FACTORS: Final = ("kp_s", "kp_sl", "kp_v", "current_max")
+ELECTRICAL: Final = (
+    "coil_reversed",
+    "exchange_phases",
+    "exchange_actuators",
+    "adc_late_s",
+    "factor_kp_s",
+    "factor_kp_sl",
+    "factor_kp_v",
+    "factor_current_max",
+    "capacitance_factor",
+)
 """What the reduced model knows nothing of."""
 DAILY = frozenset(("site.air_density", "rest_angle"))
 """The weather, and how the mover was left."""
@@ -53,18 +73,21 @@ TARGETS = {
 
 @dataclass(frozen=True)
 class Built:
-    """A linear-rotary actuator: its plant, the firmware's parameters, whether it runs as the reduced model, and the angle at
-    which it was left, rad."""
+    """A linear-rotary actuator: its plant, the firmware's parameters, whether it runs as the reduced model, the angle at
+    which it was left, rad, and what of its parameters the firmware works with, as `Plant` has them."""
 
     plant: PlantParams
     control: ControlParams
     reduced: bool = False
     rest_angle: float = 0.0
+    factors: Mapping[str, float] = field(default_factory=dict)
 
 
 def stated(rig: RigFile) -> dict[str, Toleranced]:
     """Every toleranced number of a rig file that is drawn, by its name; one that holds for each coil once for each."""
-    out = {f"geometry.{k}": t for k, t in rig.geometry.items()} | {f"machine.{k}": t for k, t in rig.machine.items()}
+    out = {f"geometry.{k}": t for k, t in rig.geometry.items()} | {
+        f"machine.{k}": t for k, t in rig.machine.items() if k not in EACH
+    }
     out |= {"site.gravity": rig.site.gravity, "site.air_density": rig.site.air_density}
     for name, sensor in rig.sensors.items():
         out |= {f"{name}.gain": sensor.gain, f"{name}.offset": sensor.offset}
@@ -89,16 +112,17 @@ def params(v: Numbers, d: Numbers) -> Built:
     Raises:
         ConfigError: a defect is planted that the reduced model, which is asked for, does not have.
     """
-    if v["reduced"] and (unseen := [name for name in ELECTRICAL if d[name]]):
+    if v["reduced"] and (unseen := [name for name in ELECTRICAL if d[name] != DEFECTS[name]]):
         raise ConfigError(f"simulation.reduced: found 1 with {', '.join(unseen)}; expected 0: the reduced model has no "
                           "half-bridges")  # fmt: skip
     plant = PlantParams(
-        **_moved(v), **_aligned(v, d), **_wound(v), **_sensed(v, d), **_wired(d),
+        **_moved(v), **_aligned(v, d), **_wound(v, d), **_sensed(v, d), **_wired(d),
         filter_r=v["filter_resistance"], supply=v["supply"], clearance=v["geometry.clearance"],
         ring_friction=v["ring_friction"],
     )  # fmt: skip
     control = ControlParams(observer_pull=0.0 if d["no_pull"] else 1.0, one_zero=d["one_zero"])
-    return Built(plant, control, v["reduced"] != 0, v["rest_angle"])
+    factors = {name: d[f"factor_{name}"] for name in FACTORS if d[f"factor_{name}"] != 1}
+    return Built(plant, control, v["reduced"] != 0, v["rest_angle"], factors)
 
 
 def _moved(v: Numbers) -> dict[str, Any]:
@@ -141,18 +165,18 @@ def _each(v: Mapping[str, float], name: str) -> Each:
     return tuple(v[f"{name}_{k}"] for k in HALVES)
 
 
-def _coils(v: Numbers, name: str) -> Each:
+def _coils(v: Numbers, name: str, spread: str) -> Each:
     """Twelve coils of the rotary actuators and three of the linear one, each with its own share on top."""
     kinds = 12 * (v[f"{name}_rot"],) + 3 * (v[f"{name}_lin"],)
-    return tuple(kind * (1 + share) for kind, share in zip(kinds, _each(v, f"{name}_spread"), strict=True))
+    return tuple(kind * (1 + share) for kind, share in zip(kinds, _each(v, spread), strict=True))
 
 
-def _wound(v: Numbers) -> dict[str, Any]:
+def _wound(v: Numbers, d: Numbers) -> dict[str, Any]:
     """Coils, and filters of the half-bridges."""
-    farad = v["filter_capacitance"]
+    farad = v["filter_capacitance"] * d["capacitance_factor"]
     return {
-        "coil_r": _coils(v, "coil_resistance"),
-        "coil_l": _coils(v, "coil_inductance"),
+        "coil_r": _coils(v, "coil_resistance", "coil_resistance_spread"),
+        "coil_l": _coils(v, "machine.inductance", "coil_inductance_spread"),
         "filter_l": _each(v, "filter_inductance"),
         "filter_c": tuple(farad * share for share in _each(v, "capacitor_derating_filter")),
         "damper_c": tuple(farad * share for share in _each(v, "capacitor_derating_damper")),
@@ -203,7 +227,7 @@ def quantities(p: Built, _: Numbers) -> dict[str, float]:
 
 def make(p: Built, seed: int, _substeps: int) -> Any:
     """The plant itself, its mover as it was left: in the rings, at its angle."""
-    plant = Plant(p.plant, seed, control=p.control, reduced=p.reduced)
+    plant = Plant(p.plant, seed, control=p.control, reduced=p.reduced, factors=p.factors)
     plant.put(angle=p.rest_angle)
     return plant
 
@@ -247,9 +271,10 @@ LIRA = Machine(
     copper_W=copper_W,
     operator=operator,
     daily=DAILY,
-    controls=frozenset(BY_NAME),
+    controls=frozenset(BY_NAME) | SENT | {f"step_{name}" for name in DQ},
     tick_s=1 / TICKS_S,
     period_s=PERIOD_S,
+    motions=Motions(mission=mission, currents=currents),
     controller=SpokenController,
     served=LineController,
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -48,16 +49,20 @@ class Plant:
         control: the firmware's parameters.
         reduced: currents follow by a lag of second order and all goes at 35 kHz: for what current loops, wiring and electrical
             captures do not matter to.
+        factors: planted: by parameter, what the firmware works with, of what it is told and tells.
     """
 
     def __init__(self, params: PlantParams | None = None, seed: int = 0, *, control: ControlParams | None = None,
-                 reduced: bool = False) -> None:  # fmt: skip
+                 reduced: bool = False, factors: Mapping[str, float] | None = None) -> None:  # fmt: skip
         self.params = params or PlantParams()
         self._p: Any = _ffi.new("lira_params *")
         self._c: Any = _ffi.new("lira_control *")
         self._s: Any = _ffi.new("lira_state *")
         fill(self._p, vars(self.params))
         fill(self._c, vars(control or ControlParams()))
+        self._factors = dict(factors or {})
+        for name, factor in self._factors.items():
+            setattr(self._c, name, factor * getattr(self._c, name))
         _lib.lira_start(self._p, self._s, seed & (2**64 - 1))
         self._advance = _lib.lira_run_reduced if reduced else _lib.lira_run
 
@@ -72,7 +77,7 @@ class Plant:
         Raises:
             AttributeError: there is no such parameter.
         """
-        setattr(self._c, name, value)
+        setattr(self._c, name, value * self._factors.get(name, 1.0))
 
     def get(self, name: str) -> float:
         """A parameter of the firmware, SI.
@@ -80,7 +85,7 @@ class Plant:
         Raises:
             AttributeError: there is no such parameter.
         """
-        return float(getattr(self._c, name))
+        return float(getattr(self._c, name)) / self._factors.get(name, 1.0)
 
     def switch(self, *, currents: bool | None = None, bearings: bool | None = None, axial: bool | None = None,
                angle: bool | None = None) -> None:  # fmt: skip

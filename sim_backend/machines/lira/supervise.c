@@ -76,7 +76,7 @@ int32_t lira_command(const lira_params *p, const lira_control *c, lira_state *st
         if (st->mode != LIRA_CURRENT) return 1;
         return farthest(st) > c->refuse_m ? 2 : (lift(c, st), 0);
     case DO_LAND: return st->mode == LIRA_LIFT || st->mode == LIRA_LEVITATED ? (land(c, st, 0), 0) : 1;
-    case DO_STOP: return st->mode == LIRA_FAULT ? 1 : (off(st, LIRA_IDLE), 0);
+    case DO_STOP: return st->mode == LIRA_FAULT ? 1 : (off(st, st->fault == FAULT_NONE ? LIRA_IDLE : LIRA_FAULT), 0);
     case DO_CLEAR:
         if (st->mode != LIRA_FAULT) return 1;
         off(st, LIRA_IDLE);
