@@ -61,7 +61,7 @@ class Holding(Part):
     """A motor that holds an angle: `ref` rad, followed no faster than `slew` rad/s; `speed` rad/s for what turns; `kp` A/rad,
     `ki` A/(rad s), `kd` A s/rad of its PID; `low_pass_hz` of the angle's rate; `derivative_on_error`, 1 where kd acts on it."""
 
-    ref: str
+    ref: str = ""  # without one it is refused (`check_capabilities`)
     slew: str = ""
     speed: str = ""
     kp: str = ""

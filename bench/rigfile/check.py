@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from bench import units
 from bench.errors import ConfigError, Problem
 from bench.rigfile import busload, check_protection, linkurl
+from bench.rigfile.beyond import beyond
 from bench.rigfile.busload import BusLoad, bus_load
 from bench.rigfile.check_binding import find, fits, signal_at
 from bench.rigfile.check_binding import problems_of as problems_of_binding
@@ -43,7 +44,7 @@ def check_rig(rig: str) -> tuple[tuple[Problem, ...], BusLoad | None]:
     load = None
     with contextlib.suppress(ConfigError, KeyError):
         load = bus_load(loaded.messages, loaded.link.bitrate, loaded.link.data_bitrate) if loaded.link.bitrate else None
-    return text.told(problems_of(loaded)), load
+    return text.told([*problems_of(loaded), *beyond(loaded)]), load
 
 
 def _behind(text: RigText, problems: tuple[Problem, ...]) -> Iterator[Problem]:

@@ -28,12 +28,16 @@ def problems_of(rig: RigFile) -> Iterator[Problem]:
         *_status(rig),
         *_units(rig),
         *_delay(rig),
+        *_angle(rig),
         *problems_of_current_steps(rig),
     ):
         yield Problem(rig.path, f"capabilities.{key}", found, expected)
 
 
 Line = tuple[str, str, str]
+SPEED_ALONE = (
+    "a motor that takes a speed alone is not turned. Leave this out, and turn the shaft by a device in the role drive"
+)
 KINDS = {"set_points.axes": "m", "set_points.slew": "m/s", "set_points.slew_tilt": "rad/s", "path.y": "m", "path.z": "m",
          "path.hz": "Hz", "path.phase": "rad", "path.ramp_s": "s", "injection.amplitude": "A", "injection.hz": "Hz",
          "injection.step": "Hz", "loop_injection.hz": "Hz",
@@ -70,6 +74,12 @@ def _delay(rig: RigFile) -> Iterator[Line]:
     elif controller is not None and delay.value <= controller.tick_s:
         longer = f"more than a tick, {controller.tick_s * 1e3:g} ms: it holds computing and the amplifier's lag"
         yield "loop_delay", f"{delay.value * 1e3:g} ms", longer
+
+
+def _angle(rig: RigFile) -> Iterator[Line]:
+    """A motor is turned by its angle; who sets a speed alone is a drive."""
+    if rig.capabilities.angle is not None and not rig.capabilities.angle.ref:
+        yield "angle.ref", "nothing", f"the parameter of the angle that the motor holds: {SPEED_ALONE}"
 
 
 def _names(rig: RigFile) -> Iterator[Line]:

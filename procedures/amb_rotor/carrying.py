@@ -1,9 +1,9 @@
 """Whether the bearings can lift the shaft off its rings: the force that each axis must give against what its coils can.
 
 From the rig file's numbers alone: the shaft's mass and places, gaps and clearances, and the defaults of the controller's
-biases, force constants (`capabilities.model`) and greatest current. One coil pulls with F = beta i^2 / (gap + clearance)^2,
-T (2.4b), across the whole of the ring's clearance, i up to twice the bias, where the other coil is off, or up to the greatest
-current.
+biases, force constants and magnetic offsets (`capabilities.model`) and greatest current. One coil pulls with
+F = beta i^2 / (gap + x)^2, T (2.4b), where the shaft on its rings lies x from the magnets' middle, away from it (`lying`), i up
+to twice the bias, where the other coil is off, or up to the greatest current.
 """
 
 from __future__ import annotations
@@ -15,11 +15,10 @@ import numpy as np
 
 from bench.rigfile import RigFile
 from procedures.amb_rotor.conventions import conventions
+from procedures.amb_rotor.lying import NOTHING, carried, lies
 from procedures.amb_rotor.machine import AmbRotor
 from procedures.amb_rotor.stations import stated
 from procedures.shared.limits import current_limit
-
-NOTHING = 1e-3  # of the weight: an axis that carries no more is level
 
 
 @dataclass(frozen=True)
@@ -48,20 +47,26 @@ def loads(rig: RigFile) -> list[Load]:
     if kg is None or machine.stations.helpers or abs(np.linalg.det(pulls)) < 1e-12:
         return []
     weight = kg * rig.site.gravity.value
-    force = np.abs(np.linalg.solve(pulls.T, weight * np.array([*machine.stations.up, 0.0, 0.0])))
+    pull = carried(machine.stations, weight, {})
+    force = np.abs(pull)
     planes = {k: name for name, pair in machine.planes.items() for k in pair}
-    return [_load(rig, machine, axis, planes[k], float(force[k])) for k, axis in enumerate(machine.axes)
-            if force[k] > NOTHING * weight]  # fmt: skip
+    s = machine.stations
+    return [
+        _load(rig, machine, axis, planes[k], float(force[k]), lies(s, k), float(np.sign(pull[k])))
+        for k, axis in enumerate(machine.axes)
+        if force[k] > NOTHING * weight
+    ]
 
 
-def _load(rig: RigFile, machine: AmbRotor, axis: str, plane: str, needed: float) -> Load:
+def _load(rig: RigFile, machine: AmbRotor, axis: str, plane: str, needed: float, off: float, way: float) -> Load:
+    """`off` m towards the coil that must pull the shaft lies, `way` 1 where that pulls to the positive side."""
     most, bias = current_limit(rig), machine.biases.get(axis, "")
     limited = bool(bias) and 2 * rig.parameters[bias].default < most
     current = 2 * rig.parameters[bias].default if limited else most
-    beta = machine.model_beta(axis)
+    beta, centre = machine.model_beta(axis), machine.model_offset(axis)
     if not beta or axis not in machine.pulls or axis not in machine.gaps or not np.isfinite(machine.clearance):
         return Load(plane, axis, needed, None, current, bias if limited else "")
-    across = machine.gaps[axis] + machine.clearance
+    across = machine.gaps[axis] - off - (rig.parameters[centre].default * way if centre else 0.0)
     force = rig.parameters[beta].default * current**2 / across**2
     return Load(plane, axis, needed, float(force), current, bias if limited else "")
 

@@ -12,7 +12,7 @@ from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.procedure.states import transition
 from bench.recording.recorder import Recorder
-from procedures.amb_rotor import nudges, pushes, rings
+from procedures.amb_rotor import liftable, nudges, pushes, rings
 from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.nudges import PROBE, Nudge
 from procedures.shared import first_look
@@ -34,6 +34,8 @@ def lift_and_nudge(rig: Rig, record: Recorder) -> bool:
         return False  # it lies below, on its rings: a probe that says otherwise may close a loop the wrong way round
     if any(pushes.judge(pushes.ask(rig, record), rig.file)):
         return False  # the analysis tells
+    if not first_look.passes(rig, record, liftable.judge(rig.file, record.calibrations)):
+        return False  # its bearings cannot lift it
     if not _lift(rig, record):
         return False
     return first_look.passes(rig, record, nudges.judge(_nudge(rig, record), rig.file))

@@ -21,7 +21,7 @@ from bench.procedure.states import transition
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from procedures.amb_rotor import frame, lift, pushes, rings
+from procedures.amb_rotor import frame, lift, liftable, pushes, rings
 from procedures.amb_rotor.conventions import AMB_ROTOR, conventions
 from procedures.amb_rotor.places import HOLD, LIFT, LIFT_LOST, REST, TILT, Held, channels, of_readings, read_steps
 from procedures.amb_rotor.stations import COORDINATES
@@ -94,6 +94,8 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     machine = conventions(rig.file)
     readings = {name: rig.levitation.reading(name) for name in machine.stations.channels}
     if any(rings.of_readings(readings, rig.file)) or any(pushes.judge(pushes.ask(rig, record), rig.file)):
+        return
+    if not first_look.passes(rig, record, liftable.judge(rig.file, record.calibrations, settings(rig.file, plan))):
         return
     if not _lift(rig, record):
         return
@@ -185,7 +187,7 @@ def read(recording: Recording[Plan]) -> tuple[Held, Held]:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     """The adjustment of all positions, and both models compared."""
-    findings.gate([*rings.before(recording), *pushes.of_recording(recording)])
+    findings.gate([*rings.before(recording), *pushes.of_recording(recording), *liftable.of_recording(recording)])
     held, tilted = read(recording)
     findings.gate(first_look.with_first(recording, _of_data(recording, held, tilted)), checks.FATAL)
     a = estimates.evaluate(recording, held)

@@ -34,7 +34,11 @@ def test_what_a_coil_gives_across_the_ring() -> None:
     rig = with_defaults(rig, **{bias: 0.5, machine.model_beta(load.axis): 7e-7})
     found = next(x for x in carrying.loads(rig) if x.axis == load.axis)
     assert found.current == 1.0
-    assert found.available == pytest.approx(7e-7 * 1.0 / (machine.gaps[load.axis] + machine.clearance) ** 2)
+    offset = rig.parameters[machine.model_offset(load.axis)].default
+    low = machine.clearance / math.sqrt(2) - offset  # of each axis, 45 degrees from upright
+    assert found.available == pytest.approx(
+        7e-7 * 1.0 / (machine.gaps[load.axis] + low) ** 2, rel=0.03
+    )  # the rings stand at the probes
 
 
 def test_a_bias_that_cannot_carry_is_named_with_both_forces() -> None:

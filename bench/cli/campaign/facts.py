@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from bench.cli.campaign.steps import Planned
 
 
-NAMED_FAULTS = ("controller-fault", "drive-fault", "lift-lost")
+NAMED_FAULTS = ("controller-fault", "drive-fault", "bearing-too-weak", "lift-lost")
 """Findings that say what is the matter with a machine that cannot do a run."""
 
 
