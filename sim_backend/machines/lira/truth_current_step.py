@@ -57,6 +57,11 @@ class Stepped:
             self._plant.command(command)
         self._calm(CALM_S)
 
+    @property
+    def angle(self) -> float:
+        """At which the mover is, rad."""
+        return float(self._plant.place[5])
+
     def step(self, name: str, size: float) -> tuple[Array, Array]:
         """The currents along and across (n,) A of a step on, such as `d_R1`, less what they were; it goes on at rest."""
         other = ("q" if name[0] == "d" else "d") + name[1:]
@@ -111,7 +116,9 @@ def currents(rig: RigFile, drawn: Truth, asked: CurrentAsked) -> Mapping[tuple[s
     built = drawn.plant
     out: dict[tuple[str, str], float] = {("u_dc", ""): built.plant.supply}
     told = {s.field: rig.parameters[s.name].default for s in SETTINGS if s.name in rig.parameters}
-    stepped = Stepped(built.plant, replace(built.control, **told), asked.angle, built.factors)
+    control = replace(built.control, **told)
+    crept = Stepped(built.plant, control, asked.angle, built.factors).angle - asked.angle
+    stepped = Stepped(built.plant, control, asked.angle - crept, built.factors)  # so that it steps at the angle of the run
     count = round(asked.response_s * TICKS_S)
     for place, name in asked.steps.items():
         along, across = (x / asked.size for x in stepped.step(name, asked.size))
