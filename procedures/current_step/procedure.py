@@ -115,7 +115,11 @@ def _captured(rig: Rig, plan: Plan, record: Recorder, kind: str, attempt: int, l
         rig.levitation.set(place.parameter, 0.0)
         rig.capture.wait(lasts + 5.0)
     data = rig.capture.upload(None, number=labels["number"], attempt=attempt)
-    return kind == PUSH or fit.edges(data.columns[place.along], size, 1 / data.rate_hz) is not None
+    if kind == PUSH:
+        return True
+    along = data.columns[place.along]
+    pair = fit.edges(along, size, 1 / data.rate_hz)
+    return pair is not None and pair[1].at + round(plan.response_s * data.rate_hz) < len(along)
 
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Result:

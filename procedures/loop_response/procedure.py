@@ -229,6 +229,7 @@ procedure = Procedure(
     steps_on=steps_on,
     fewest_steps=lambda plan: 1,
     untold=untold,
+    optional=(S_MAX, AT),  # of none that is chosen
     left_out=lambda plan: (S_MAX, AT) if plan.sensitive == () else (),
     assumes=assumptions.LOOP_RESPONSE,
     method=read_method(__file__),

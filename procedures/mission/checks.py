@@ -33,7 +33,8 @@ def of_flight(flight: Flight, rig: RigFile, plan: Plan) -> Iterator[Finding]:
     elif outside := [m for m in flight.moves if not any(holds(p, m) for p in flight.pieces)]:
         text = (
             f"{len(outside)} of {len(flight.moves)} moves lie in no capture, first that of repeat {outside[0].repeat}: "
-            "commands came later than a capture leaves room for. Take a host that is less busy"
+            "commands came later than a capture leaves room for. Take a host that is less busy, or a longer "
+            f"spare_s ({plan.spare_s:g} s a move)"
         )
         yield Finding("moves-missing", text, "move", Effect.ERROR)
 

@@ -23,6 +23,7 @@ class Plan(BenchPlan):
     angle_rise_rad_s2: float = Field(300.0, gt=0)
     repeats: int = Field(4, ge=2)  # there and back
     dwell_s: float = Field(0.5, gt=0.1, le=TIMES_S)  # from the command of a move to the next one
+    spare_s: float = Field(0.02, ge=0, le=TIMES_S)  # of each move in a capture, for what its commands take on their way
     rest_s: float = Field(0.15, ge=0.05)  # of it, at its end: the mover stands
     turn_s: float = Field(1.0, gt=0, le=TIMES_S)  # for the turn to the first angle in the rings
     lift_s: float = Field(1.0, gt=0, le=TIMES_S)  # captured from just before the lift; the gate has to pass meanwhile

@@ -72,7 +72,7 @@ def pieces(plan: Plan) -> list[range]:
 
 def piece_s(plan: Plan, repeats: int) -> float:
     """How long a capture of so many repeats is, s; a command takes a while."""
-    return 2 * repeats * (plan.dwell_s + 2 * LOOK_S) + TAIL_S
+    return 2 * repeats * (plan.dwell_s + plan.spare_s) + TAIL_S
 
 
 @contextmanager

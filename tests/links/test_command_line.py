@@ -100,3 +100,26 @@ def listening(folder: Path, url: str) -> Callable[[], list[tuple[float, float]]]
         return list(zip(decoded["state"].tolist(), decoded["host_age"].tolist(), strict=True))
 
     return told
+
+
+@pytest.mark.long
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize(
+    ("rig_name", "procedure", "plan"),
+    [("lira-200v", "current-step", ("repeats=4", "small_repeats=4")),
+     ("lira", "mission", ("repeats=2", "spare_s=0.5")),
+     ("lira", "loop-response", ("axes=['z', 'gamma']",))],
+)  # fmt: skip
+def test_procedures_over_the_command_line(tmp_path: Path, rig_name: str, procedure: str, plan: tuple[str, ...]) -> None:
+    """Each against a served rig, as processes: what is measured holds what the machine was drawn with."""
+    arguments = tuple(x for one in plan for x in ("--plan", one))
+    with processes.served(tmp_path, "--seed", "3", "--truth", "reduced=0", rig=rig_name, ports=PORTS) as rig:
+        with processes.real_bench(
+            tmp_path, "run", procedure, "--rig", rig_name, "--backend", "live", "--operator", "auto", "--no-report",
+            *rig.links("cli:socket"), *arguments,
+        ) as host:  # fmt: skip
+            status = host.end(800.0)
+            record = processes.record_in(tmp_path, host)
+    assert status == 0, record["findings"]
+    assert record["measurements"]
+    assert record["link"]["lost"] == 0

@@ -118,7 +118,9 @@ def currents(rig: RigFile, drawn: Truth, asked: CurrentAsked) -> Mapping[tuple[s
     told = {s.field: rig.parameters[s.name].default for s in SETTINGS if s.name in rig.parameters}
     control = replace(built.control, **told)
     crept = Stepped(built.plant, control, asked.angle, built.factors).angle - asked.angle
-    stepped = Stepped(built.plant, control, asked.angle - crept, built.factors)  # so that it steps at the angle of the run
+    stepped = Stepped(
+        built.plant, control, asked.angle - crept, built.factors
+    )  # so that it steps at the angle of the run
     count = round(asked.response_s * TICKS_S)
     for place, name in asked.steps.items():
         along, across = (x / asked.size for x in stepped.step(name, asked.size))
