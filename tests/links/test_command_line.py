@@ -122,4 +122,4 @@ def test_procedures_over_the_command_line(tmp_path: Path, rig_name: str, procedu
             record = processes.record_in(tmp_path, host)
     assert status == 0, record["findings"]
     assert record["measurements"]
-    assert record["link"]["lost"] == 0
+    assert record["link"]["gaps"] == 0
