@@ -78,6 +78,7 @@ void table_start(void)
         snprintf(name, sizeof name, "i_%s", dq[k]);
         add(52 + k, name, "A", 1e-3);
     }
+    add(62, "wave", "1", 1.0 / 32768);
     for (int k = 0; k < parameter_count; k++) parameters[k].value = parameters[k].saved = (float)parameters[k].delivered;
 }
 

@@ -176,6 +176,7 @@ static void step(int n, char **a)
     double value;
     if (n == 2) strncat(name, a[0], 8);
     int k = n == 2 ? channel_named(name) - 52 : -1;
+    if (k >= CURRENTS) k = -1;
     if (k < 0 || !number_of(a[1], &value)) fail(ARGUMENTS, "d_R1..q_L AMPERES");
     else if (value < -5 || value > 5) fail(RANGE, "%s -5..5", a[0]);
     else if (state != CURRENT && state != LEVITATED) wrong_state();
