@@ -162,7 +162,6 @@ def _move(
         rest_motor=motor[:, rest],
         rest_segments=segments[:, rest],
         components=machine.components,
-        rest_angle=angle[rest],
     )
 
 

@@ -27,7 +27,6 @@ FINE = 2000  # points of the ellipse that are looked at
 LARGE = 0.5  # of the greatest step: those whose answers are looked at
 RESTS = 4  # samples before a step that it is counted from
 REACH_S = 6e-3  # after a step
-READ_PERIODS = 4  # of the telemetry that the answer is looked at
 
 
 @dataclass(frozen=True)
@@ -82,9 +81,8 @@ def delay(
     if not at:
         raise AnalysisError("found no samples about the steps of the reference; expected some about each")
     when, what = np.concatenate(at), np.concatenate(answers)
-    window = READ_PERIODS * max(ticks * tick, period_s)
     return onset(
-        when, what, None, 0.0, 2 * period, tick=tick, ticks=ticks, lag_s=machine.lag_s, window_s=window, answers=len(at)
+        when, what, 0.0, 2 * period, tick=tick, ticks=ticks, lag_s=machine.lag_s, period_s=period_s, answers=len(at)
     )
 
 

@@ -14,9 +14,9 @@ from bench.recording import Recording, Step
 from bench.rigfile import RigFile
 from bench.rigfile.roles import SPEED, STATUS
 from procedures.amb_rotor.conventions import conventions
-from procedures.amb_rotor.geometry import Facts, centre, left, nominal
+from procedures.amb_rotor.geometry import Facts, left
 from procedures.amb_rotor.machine import AmbRotor
-from procedures.amb_rotor.onset import Course, onset, pushing
+from procedures.amb_rotor.onset import onset, pushing
 from procedures.shared.sampled import of_telemetry
 from procedures.tracking.ellipse import Path, Wave
 from procedures.tracking.points import delay, read_points
@@ -127,13 +127,10 @@ def _start(recording: Recording[Any], start: Step, wave: Wave) -> tuple[float, f
     if not written or not answered or len(begun["t_ns"]) < 20:
         raise AnalysisError("found no start of the reference; expected its write within the step, and samples about it")
     current = np.sum([pushing(machine, "z", a, begun) for a in machine.along("z")], axis=0)
+    lag = conventions(recording.rig).lag_s
     earliest, latest = ((t - start.start_ns) * 1e-9 for t in (written[0], answered[0]))
     at = (begun["t_ns"] - start.start_ns) * 1e-9
-    z = centre(np.array([begun[c] for c in machine.stations.channels]), nominal(recording.rig, 0.0))[1]
-    gone = np.maximum(at - (earliest + latest) / 2, 0.0)
-    turned = wave.z * (np.cos(2 * np.pi * wave.ratio * wave.hz * gone) - 1)  # of the reference, since it jumped
-    course = Course(at, z - turned, wave.ticks * wave.tick)
-    return onset(at, current, course, earliest, latest, tick=wave.tick, ticks=wave.ticks, lag_s=machine.lag_s)
+    return onset(at, current, earliest, latest, tick=wave.tick, ticks=wave.ticks, lag_s=lag, period_s=wave.period)
 
 
 def _read(recording: Recording[Any], step: Step, grown: Step | None, origin: int, t_0: float, clear: float) -> Orbit:

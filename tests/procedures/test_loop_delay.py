@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from bench.rigfile import RigFile, load_rig
 from bench.rigfile.check_capabilities import problems_of
 from procedures.amb_rotor import loops
-from procedures.step.estimates import ALIAS, RISE_SHARE, START_S, aliased, lag_estimate, spline_left, start_s
+from procedures.amb_rotor.onset import onset
+from procedures.step.acting import WINDOW_S
+from procedures.step.estimates import ALIAS, RISE_SHARE, aliased, lag_estimate, spline_left
 from sim_backend.machines.twin.rules import drawn
 
 STAND = Path(__file__).parents[2] / "examples" / "plain-stand" / "stand.toml"
@@ -73,11 +76,16 @@ def test_the_twins_amplifiers_are_what_the_file_says() -> None:
     assert (by_rule.value, by_rule.half_width) == (800, 40)
 
 
-def test_a_lag_that_only_the_controller_tells_is_known_to_a_data_sheets_share() -> None:
-    amb = load_rig("amb5dof")
-    assert lag_estimate(amb) is None
-    assert start_s(amb) == pytest.approx(START_S + 0.05 * loops.lag_s(amb))
-    assert start_s(load_rig(str(STAND))) == START_S
+@pytest.mark.parametrize("begun", [0.0, 6e-5, 1.1e-4])
+def test_single_readings_tell_a_start_that_means_of_half_a_millisecond_miss(begun: float) -> None:
+    """The shape of the plain stand's currents, whose shaft is half way in a millisecond."""
+    lag, tick = 2e-4, 1.25e-4
+    t = np.arange(-200, 80) * tick
+    since = np.maximum(t - tick - begun - 2 * tick, 0)
+    current = 1 - np.exp(-since / lag) - 2e5 * since**2
+    current = current + 0.02 * np.random.default_rng(0).standard_normal(len(t))
+    found, _ = onset(t, current, begun - 7e-4, begun + 3e-4, tick=tick, ticks=1, lag_s=lag, window_s=WINDOW_S)
+    assert found == pytest.approx(begun, abs=4e-5)
 
 
 def test_what_sampling_leaves_falls_with_the_samples_of_a_rise() -> None:

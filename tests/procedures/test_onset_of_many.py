@@ -29,8 +29,7 @@ def answers(jump: float, begun: float, seed: int, ticks: int) -> tuple[Array, Ar
 
 def seen(jump: float, begun: float, seed: int, ticks: int) -> tuple[float, float]:
     t, current = answers(jump, begun, seed, ticks)
-    window = 4 * max(ticks * TICK, PERIOD)
-    return onset(t, current, None, 0.0, 2 * PERIOD, tick=TICK, ticks=ticks, lag_s=LAG, window_s=window, answers=ANSWERS)
+    return onset(t, current, 0.0, 2 * PERIOD, tick=TICK, ticks=ticks, lag_s=LAG, period_s=PERIOD, answers=ANSWERS)
 
 
 @pytest.mark.parametrize("ticks", [1, 20])

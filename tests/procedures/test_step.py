@@ -22,6 +22,7 @@ from bench.rigfile import load_rig
 from bench.rigfile.roles import Status
 from bench.uncertainty import Estimate, Influence, interval
 from bench.uncertainty.coverage import ensemble
+from procedures.amb_rotor.onset import onset
 from procedures.step import checks, coupled, estimates, fit, oscillation, planes, response, scatter, settling, slewing
 from procedures.step import steps as step_steps
 from procedures.step.plan import Plan
@@ -362,6 +363,17 @@ def test_a_second_order_step_from_means(z: float, shift: float) -> None:
     assert fitted.damping == pytest.approx(z, rel=0.003)
     assert fitted.frequency == pytest.approx(70, rel=0.002)
     assert float(y.max()) < fitted.peak  # the largest mean is below the largest value
+
+
+@pytest.mark.parametrize("begun", [0.0, 2.3e-4, 6.1e-4])
+def test_when_a_set_point_acted_is_told_finer_than_the_telemetry(begun: float) -> None:
+    lag, tick = 4e-4, 1e-4
+    t = np.arange(-30, 20) * 1e-3
+    reads = t[:, None] - tick * np.arange(1, 11) - begun - 2 * tick
+    since = np.maximum(reads, 0)
+    current = (1 - np.exp(-since / lag) - 8e3 * since**2).mean(axis=1)
+    found, _ = onset(t, current, begun - 4e-4, begun + 8e-4, tick=tick, ticks=10, lag_s=lag)
+    assert found == pytest.approx(begun, abs=4e-5)
 
 
 @pytest.mark.parametrize(
