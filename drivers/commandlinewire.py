@@ -11,7 +11,7 @@ from bench.link import LinkStats
 from bench.link.codec import places_of
 from bench.link.commandstream import CommandStream
 from bench.link.frames import FrameBatch
-from bench.rigfile import RigFile, linkurl
+from bench.rigfile import RigFile
 from bench.rigfile.commandline import CommandLine
 from bench.wire.commandline import Line, Reply, Splitter, read_line, request
 from drivers.beat import WriterSpec
@@ -89,21 +89,17 @@ class CommandLineWire:
             self._port.write(data)
 
 
-def open_command_line(url: linkurl.LinkUrl, name: str, rig: RigFile, now_ns: Callable[[], int]) -> CommandLineWire:
-    """Open a link `cli:`; a serial port whose controller starts at another rate is brought to that of the URL.
+def speak(port: BytePort, wanted: int | None, name: str, rig: RigFile, now_ns: Callable[[], int]) -> CommandLineWire:
+    """The wire on an open port, which is its own from now on; a serial port whose controller starts at another rate than is
+    `wanted` is brought to that.
 
     Raises:
-        ConfigError: it cannot be opened, the rig file has no table `commandline`, or nobody answers at either rate.
+        ConfigError: the rig file has no table `commandline`, or nobody answers at either rate.
     """
     lines = rig.commandline
-    if lines is None:
-        raise ConfigError(f"link {name}: a cli: link needs the table [commandline] in the rig file; found none")
-    wanted = int(url.query["baudrate"]) if url.query.get("baudrate", "").isdigit() else None
     try:
-        port = BytePort.open(url.rest.removeprefix("serial:"), baudrate=wanted)
-    except ConfigError as error:
-        raise ConfigError(f"link {name}: {error}") from error
-    try:
+        if lines is None:
+            raise ConfigError(f"link {name}: a cli: link needs the table [commandline] in the rig file; found none")
         if port.serial is not None and wanted is not None and lines.baudrate_first not in (None, wanted):
             _agree(port, name, lines, wanted)
         return CommandLineWire(port, rig, now_ns)

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from typing import Any, Protocol
 
 import can
@@ -182,9 +181,7 @@ def open_reception(
     if url.scheme == "serial":
         return PacketReception(open_port(name, url, MutePort), now_ns)
     if url.scheme == "cli" and rig is not None:
-        return LineReception(
-            open_port(name, replace(url, rest=url.rest.removeprefix("serial:")), MutePort), rig, now_ns
-        )
+        return LineReception(open_port(name, url, MutePort), rig, now_ns)
     raise ConfigError(
         f"link {name}: found {spec.url!r}, where nothing can be listened to; expected a URL that starts with slcan:, can:, "
         f"serial: or cli:. Next: --link {name}=URL with one that `bench serve` prints, or that of the adapter"

@@ -15,7 +15,7 @@ from bench.rigfile import LinkSpec, RigFile, linkurl
 from drivers.beat import WriterSpec
 from drivers.byteport import BytePort
 from drivers.canbus import CanBus, open_bus
-from drivers.commandlinewire import open_command_line
+from drivers.commandlinewire import speak
 
 IN_PROCESS = ("virtual", "serial", "slcan", "seeedstudio", "robotell")
 """CAN interfaces of python-can that another process cannot reach, or that two readers would take bytes from."""
@@ -206,7 +206,7 @@ def open_wire(
     if url.scheme == "serial":
         return PacketWire(open_port(name, url, BytePort), clock)
     if url.scheme == "cli" and rig is not None:
-        return open_command_line(url, name, rig, clock)
+        return speak(open_port(name, url, BytePort), _baudrate(name, url.query), name, rig, clock)
     raise ConfigError(f"link {name}: found {spec.url!r}; expected a URL that starts with slcan:, can:, serial: or cli:")
 
 
@@ -214,14 +214,14 @@ P = TypeVar("P", bound=BytePort)
 
 
 def open_port(name: str, url: linkurl.LinkUrl, kind: type[P]) -> P:
-    """The byte stream of a link `serial:`, with the baud rate of its URL.
+    """The byte stream of a link `serial:` or `cli:`, with the baud rate of its URL.
 
     Raises:
         ConfigError: it cannot be opened, or the URL has other settings.
     """
     baudrate = _baudrate(name, url.query)
     try:
-        return kind.open(url.rest, baudrate=baudrate)
+        return kind.open(url.rest.removeprefix("serial:"), baudrate=baudrate)
     except ConfigError as error:
         raise ConfigError(f"link {name}: {error}") from error
 

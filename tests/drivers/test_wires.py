@@ -12,7 +12,7 @@ from far_end import Adapter, FarEnd, far_end, until
 
 from bench.errors import ConfigError, LinkError
 from bench.link.frames import ERROR, EXTENDED, FD, FrameBatch, empty_batch, frame, payload
-from bench.rigfile import LinkSpec
+from bench.rigfile import LinkSpec, load_rig
 from drivers.wires import CanWire, PacketWire, Wire, open_wire
 
 KINDS = pytest.mark.parametrize("end", [False, True], indirect=True, ids=["pty", "tcp"])
@@ -158,3 +158,12 @@ def test_what_is_no_wire_says_so_in_one_line(url: str, says: str) -> None:
 def test_a_busy_port_names_link_port_and_owner(end: FarEnd, wire: Wire) -> None:
     with pytest.raises(ConfigError, match=f"link serial0: port {end.where}: it is in use by this process"):
         open_wire(LinkSpec(url=f"serial:{end.where}"), "serial0")
+
+
+@pytest.mark.parametrize(
+    ("query", "said"),
+    [("baudrate=abc", "a whole number of Bd"), ("speed=3", "at most baudrate=N")],
+)
+def test_settings_of_a_command_line_are_looked_at_as_those_of_packets(query: str, said: str) -> None:
+    with pytest.raises(ConfigError, match=said):
+        open_wire(LinkSpec(url=f"cli:serial:/dev/null?{query}"), "controller", rig=load_rig("lira"))
