@@ -12,8 +12,11 @@ from bench.wire.captureblock import Block
 from bench.wire.commandline import Event, Line, Reply, Splitter, read_line, request
 from sim_backend.machines.lira.device import Device
 from sim_backend.machines.lira.params import PlantParams
-from sim_backend.machines.lira.plant import TRACE, Plant
+from sim_backend.machines.lira.plant import STATES, TRACE, Plant
 from sim_backend.machines.lira.settings import MEASUREMENTS, SETTINGS
+from sim_backend.machines.lira.streamed import TOLD
+
+TOLD_STATE = 18  # sequence, sixteen values, supply, state
 
 
 class Host:
@@ -190,3 +193,22 @@ def test_arbitrary_bytes_never_crash_it(parts: list[bytes]) -> None:
         said = device.shell.feed(part + b"\n")
         assert all(isinstance(p, Line | Block) for p in Splitter().feed(said))
         device.advance(1e-4)
+
+
+def test_each_sample_tells_the_age_of_the_heartbeat_at_its_own_instant() -> None:
+    """The host is lost within a slice of the machine's time: samples before that tell the age they had."""
+    host = Host()
+    host.ask("idle")
+    host.ask("on", "current")
+    assert host.ask("stream", "1000").kind == "ok"
+    for _ in range(12):  # off the grid of the samples: the last hears the host lost in the middle of a slice
+        host._read(host.device.advance(10.3e-3), replies=False)
+    assert host.device.plant.fault == "HEARTBEAT_LOST"
+    blocks = Splitter().feed(b"".join(host.device.streamed.waiting))
+    told = [TOLD.unpack(b.data) for b in blocks if isinstance(b, Block)]
+    ages = np.array([t[-1] for t in told])
+    state = np.array([t[TOLD_STATE] for t in told])
+    held = ages[state == STATES.index("CURRENT")]
+    assert held[-1] == pytest.approx(80, abs=1)  # its watchdog.s
+    assert set(np.diff(held)) == {1}
+    assert set(ages[state == STATES.index("FAULT")]) == {0xFFFF}

@@ -72,7 +72,7 @@ class Device:
             at = self.tick
             every = capture.every if capture else POSITION_TICKS
             self._rows = self.plant.run(ticks / TICKS_S, every, whole=True)
-            self.streamed.take(self._rows, at, every, self.plant.heard_s)
+            self.streamed.take(self._rows, at, every)
             if capture is not None:
                 capture.take(self._rows, at)
                 if capture.full:

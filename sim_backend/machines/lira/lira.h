@@ -79,7 +79,7 @@ void lira_coils(const double *dq, double cos_phase, double sin_phase, double *co
 #define SYSTEMS 5
 #define POLE_PAIRS 8
 #define LIRA_TRACE 70
-#define LIRA_WHOLE (LIRA_TRACE + 3 * BRIDGES + 1)
+#define LIRA_WHOLE (LIRA_TRACE + 3 * BRIDGES + 2)
 #define STEP_S (LIRA_TICK * POSITION_TICKS)
 enum { LIRA_OFF, LIRA_IDLE, LIRA_CURRENT, LIRA_LIFT, LIRA_LEVITATED, LIRA_LANDING, LIRA_FAULT };
 enum { DO_IDLE, DO_ON, DO_LIFT, DO_LAND, DO_STOP, DO_CLEAR, DO_SAFE };

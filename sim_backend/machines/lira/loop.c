@@ -67,7 +67,8 @@ static void tell(const lira_params *p, const lira_state *st, double *out) {
     out[69] = st->wave;
 }
 
-/* a row of the trace, with the half-bridges' measurements where they are wanted too; how long it is */
+/* a row of the trace, with the half-bridges' measurements and the age of the host's heartbeat where they are wanted too; how long
+ * it is */
 static INLINE int64_t tell_row(const lira_params *p, const lira_state *st, double *out, int32_t whole) {
     tell(p, st, out);
     if (!whole) return LIRA_TRACE;
@@ -75,6 +76,7 @@ static INLINE int64_t tell_row(const lira_params *p, const lira_state *st, doubl
     memcpy(out + LIRA_TRACE + BRIDGES, st->u_read, sizeof st->u_read);
     memcpy(out + LIRA_TRACE + 2 * BRIDGES, st->coil_read, sizeof st->coil_read);
     out[LIRA_TRACE + 3 * BRIDGES] = p->supply;
+    out[LIRA_TRACE + 3 * BRIDGES + 1] = st->heard >= 0 ? (double)(st->tick - st->heard) * LIRA_TICK : -1;
     return LIRA_WHOLE;
 }
 

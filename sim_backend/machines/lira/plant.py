@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -34,8 +33,9 @@ TRACE: Final = (
 """Of one tick: readings, true places of the sensors' targets; as the firmware has them dq coil currents, capacitor voltages,
 inductor currents and references, the forces it wants, the rates it sees; what rings bear, limited loops, what is injected;
 state and fault; the injected sine as a share of its amplitude."""
-WHOLE: Final = (*TRACE, *MEASURED[:46])
-"""With the half-bridges' measurements and the supply, too."""
+WHOLE: Final = (*TRACE, *MEASURED[:46], "heard")
+"""With the half-bridges' measurements and the supply, too, and how long ago the host's last heartbeat was, s; -1 while none is
+waited for."""
 
 _ffi, _lib = open_core(Path(__file__).with_name("lira.h"))
 
@@ -110,11 +110,6 @@ class Plant:
     def beat(self) -> None:
         """A heartbeat of the host."""
         self._s.heard = self._s.tick
-
-    @property
-    def heard_s(self) -> float:
-        """Since the host's last heartbeat; infinite while none is waited for."""
-        return (self._s.tick - self._s.heard) / TICKS_S if self._s.heard >= 0 else math.inf
 
     @property
     def state(self) -> str:

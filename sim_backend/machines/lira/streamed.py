@@ -18,8 +18,8 @@ SLOTS: Final = 35_000
 FASTEST: Final = 1000
 LSB: Final = (*(1e-8,) * 4, 1e-6, 2 * math.pi / 2**16, *(1e-3,) * len(DQ))
 SIGNED: Final = tuple(WHOLE.index(name) for name in (*AXES, *(f"i_{name}" for name in DQ)))
-SUPPLY, STATE, FAULT, LIMITED, SPEED = (
-    WHOLE.index(name) for name in ("u_dc", "mode", "fault", "limited", "rate_angle")
+SUPPLY, STATE, FAULT, LIMITED, SPEED, HEARD = (
+    WHOLE.index(name) for name in ("u_dc", "mode", "fault", "limited", "rate_angle", "heard")
 )
 TOLD: Final = struct.Struct("<H16hHBBHhH")
 """Sequence; x1 x2 y1 y2, z, angle, dq currents; supply, state, fault, limited loops, rate of the angle, ms since the last
@@ -52,11 +52,11 @@ class Streamed:
         self.waiting.clear()
         self._ticks = self._count = 0
 
-    def take(self, rows: Array, tick: int, every: int, heard_s: float) -> None:
+    def take(self, rows: Array, tick: int, every: int) -> None:
         """Rows (n, len(WHOLE)) of the machine, of every so many ticks from a tick on."""
         for k in self._due(tick, every, len(rows)):
             self._count = (self._count + 1) & 0xFFFF
-            self.waiting.append(block(NUMBER, (tick + k * every) & 0xFFFFFFFF, told(self._count, rows[k], heard_s)))
+            self.waiting.append(block(NUMBER, (tick + k * every) & 0xFFFFFFFF, told(self._count, rows[k])))
 
     def _due(self, tick: int, every: int, count: int) -> Iterator[int]:
         if self._ticks:
@@ -64,11 +64,12 @@ class Streamed:
             yield from range((first - tick) // every, count, self._ticks // every)
 
 
-def told(count: int, row: Array, heard_s: float) -> bytes:
+def told(count: int, row: Array) -> bytes:
     """The bytes of one sample."""
     signed = [_held(round(row[k] / lsb), -(2**15), 2**15 - 1) for k, lsb in zip(SIGNED, LSB, strict=True)]
     signed[5] = (round(row[SIGNED[5]] / LSB[5]) + 2**15) % 2**16 - 2**15  # an angle comes round
-    supply, age = (_held(round(x), 0, 0xFFFF) for x in (row[SUPPLY] / 0.01, min(heard_s, 65.535) * 1e3))
+    supply = _held(round(row[SUPPLY] / 0.01), 0, 0xFFFF)
+    age = min(round(row[HEARD] * 1e3), 0xFFFF) if row[HEARD] >= 0 else 0xFFFF
     speed = _held(round(row[SPEED] / 0.005), -(2**15), 2**15 - 1)
     return TOLD.pack(count, *signed, supply, int(row[STATE]), int(row[FAULT]), int(row[LIMITED]), speed, age)
 
