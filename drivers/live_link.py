@@ -87,7 +87,9 @@ class LiveLink:
         heartbeats, frames, longest = self._heartbeat.counts()
         total.heartbeats, total.longest_heartbeat_gap_ns = heartbeats, longest
         total.refused += self._heartbeat.refused
-        total.sent = heartbeats + (frames if self._heartbeat.owns_port else total.sent)
+        total.sent += heartbeats + (
+            frames if self._heartbeat.owns_port else 0
+        )  # the wire counts what it wrote or spoke
         return total
 
     @property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import os
 import signal
@@ -16,8 +17,9 @@ from far_end import Adapter, FarEnd, descriptors, far_end, until
 
 from bench.errors import ConfigError, LinkError
 from bench.link import LinkStats
+from bench.link.codec import encode
 from bench.link.frames import FD, FrameBatch, empty_batch, frame
-from bench.rigfile import LinkSpec
+from bench.rigfile import LinkSpec, load_rig
 from drivers.beat import Beat, WriterSpec
 from drivers.heartbeat import HeartbeatProcess
 from drivers.live_link import LiveLink
@@ -234,6 +236,21 @@ def test_the_status_is_asked_for_by_the_heartbeat_process() -> None:
             adapter.status = b"F80\r"
             assert "link can0: the CAN interface reports bus off" in error_of(link)
             assert link.stats.bus_off == 1
+
+
+def test_messages_said_as_lines_are_counted_like_frames() -> None:
+    """Another process writes them as the bytes they are: what they say is the wire's to count."""
+    rig = load_rig("lira")
+    asked = rig.messages["ParamGet"]
+    with far_end() as end:
+        link = LiveLink(
+            "controller", lambda: open_wire(LinkSpec(url=f"cli:serial:{end.where}"), "controller", rig=rig), BEAT
+        )
+        with contextlib.closing(link):
+            for _ in range(3):
+                link.send(frame(asked.identifier, encode(asked, {"index": 1})))
+            until(lambda: end.received.count(b" get ") >= 3)
+            assert link.stats.sent - link.stats.heartbeats == 3
 
 
 # Threads
