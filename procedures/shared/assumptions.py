@@ -149,7 +149,7 @@ CURRENT_STEP = (
     "A coil of the linear winding that is reversed and stands where its current gives no force: it pushes nothing there.",
 )
 UNSTABLE_POLE = (
-    "Magnets that pull by more than in proportion to the way: shots of 15 µm tell a mean over them. A pull that is 1 % stiffer at "
-    "20 µm than at the middle changes the pole by about 0.3 %.",
+    "Magnets that pull by more than in proportion to the way: shots of 15 µm tell a mean over them. A pull that is 1 % "
+    "stiffer at 20 µm than at the middle changes the pole by about 0.3 %.",
     "Another place along the shaft: the pole is that of planes which pull as they do where it was measured.",
 )

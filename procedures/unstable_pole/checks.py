@@ -34,8 +34,8 @@ def of_signals(taken: Sequence[Taken], rig: RigFile, plan: Plan) -> Iterator[Fin
     fell = [t for t in taken if {rig.binding.mode(s) for s in t.states} != {HELD} or t.caught > plan.bound_m]
     if fell:
         worst = max(fell, key=lambda t: t.caught)
-        text = (f"after {len(fell)} of {len(taken)} shots the shaft was not back: it read {worst.caught * 1e6:.0f} µm at the end "
-                "of the capture. Push less, or hold for less time.")  # fmt: skip
+        text = (f"after {len(fell)} of {len(taken)} shots the shaft was not back: it read {worst.caught * 1e6:.0f} µm at the "
+                "end of the capture. Push less, or hold for less time.")  # fmt: skip
         yield Finding("not-caught", text, worst.where, Effect.ERROR)
     lost, expected = np.array([(t.lost, t.expected) for t in taken], dtype=float).T
     yield from signals.losses(lost, expected, plan.max_lost, lambda share: taken[int(np.argmax(share))].where)
@@ -64,8 +64,8 @@ def of_results(results: Sequence[Result], plan: Plan) -> Iterator[Finding]:
         share, u_share = abs(tilt) / growth, (u_tilt + abs(tilt) / growth * u) / growth
         if share - SURE * u_share > EXCITED:
             bad = share - SURE * u_share > plan.max_tilt
-            text = (f"a push tilts the shaft by {share:.0%} of how far it moves it: planes that pull or push unlike, or a centre "
-                    "of mass off their middle. Both modes are fitted.")  # fmt: skip
+            text = (f"a push tilts the shaft by {share:.0%} of how far it moves it: planes that pull or push unlike, or a "
+                    "centre of mass off their middle. Both modes are fitted.")  # fmt: skip
             text += " So much is none of this: does the push reach both planes?" if bad else ""
             yield Finding(
                 "tilt-excited", text, r.axis, Effect.INDETERMINATE if bad else Effect.NOTE, concerns if bad else ()

@@ -26,8 +26,8 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Result:
-    """Of one axis: the shots that tell of it, pushed along it or not, what was fitted to them, how far a push along it goes in
-    u and d from one way to the other at the same time, `growth` and `tilt` m with standard uncertainties, and the quantities."""
+    """Of one axis: the shots that tell of it, pushed along it or not, what was fitted to them, how far a push along it takes
+    u and d to its side, `growth` and `tilt` m with standard uncertainties, and the quantities."""
 
     axis: str
     shots: tuple[Taken, ...]
@@ -52,7 +52,7 @@ def results(taken: Sequence[Taken], rig: RigFile, plan: Plan) -> tuple[list[Resu
             failed.append(Finding("pole-not-told", f"{axis}: {error}.", axis, Effect.INDETERMINATE,
                                   (f"pole@{axis}", f"stiffness@{axis}")))  # fmt: skip
             continue
-        growth, tilt = went([t for t in shots if t.axis == axis], axis)
+        growth, tilt = went(shots, axis, release)
         mass = certified(ability(rig).mass, Places(rig).known[ability(rig).mass], "mass")
         found = {"pole": square**0.5, "stiffness": square * mass}
         out.append(Result(axis, shots, release, growth, tilt, found))
@@ -89,12 +89,17 @@ def half_distance(rig: RigFile, axis: str) -> float:
     return abs(Places(rig).distance(one, other).value) / 2
 
 
-def went(pushed: Sequence[Taken], axis: str) -> tuple[tuple[float, float], tuple[float, float]]:
-    """How far u and d go to the side of the push, mean of all shots at the end of the shortest, m, with standard
-    uncertainties: how each began is another for each."""
-    if len(pushed) < 2:
+def went(some: Sequence[Taken], axis: str, release: Release) -> tuple[tuple[float, float], tuple[float, float]]:
+    """How far a push along an axis takes u and d to its side from rest, by the fit, until the end of the shortest shot, m, with
+    standard uncertainties: half of what differs between the mean currents of both ways pushes. How each shot began is no part
+    of it, as it is of where it ended."""
+    pushed = [t for t in some if t.axis == axis]
+    ways = [np.array([t.held for t in pushed if t.push * sign > 0]) for sign in (1, -1)]
+    if min(len(way) for way in ways) < 2:
         return (0.0, math.inf), (0.0, math.inf)
-    n = min(len(t.z[axis]) for t in pushed)
-    ends = np.array([math.copysign(1, t.push) * (t.z[axis][n - 3 : n].mean(axis=0)) for t in pushed])
-    mean, u = ends.mean(axis=0), ends.std(axis=0, ddof=1) / math.sqrt(len(ends))
-    return (float(mean[0]), float(u[0])), (float(mean[1]), float(u[1]))
+    half = np.append((ways[0].mean(axis=0) - ways[1].mean(axis=0)) / 2, 0.0)
+    last = (min(len(t.z[axis]) for t in pushed) - 1) * pushed[0].step_s
+    _, forces = fit.basis(release.square, np.array([last]))
+    size = forces[0] @ (release.pushed @ half)
+    spread = forces[0] ** 2 @ np.einsum("i,rij,j->r", half, release.pushed_covariance, half)
+    return (float(size[0]), math.sqrt(spread[0])), (float(size[1]), math.sqrt(spread[1]))

@@ -24,7 +24,7 @@ def _shots(result: Result) -> Figure:
     some = [k for k, t in enumerate(result.shots) if t.axis == result.axis][:SHOWN]
     for k in some:
         t, curve = result.shots[k], result.release.curves[k]
-        ms = np.arange(len(curve)) * t.step_s * 1e3
+        ms = np.arange(len(curve), dtype=np.float64) * (t.step_s * 1e3)
         z = t.z[result.axis] * 1e6
         series += [Series("" if series else "mean of both planes", ms, z[:, 0], "points"),
                    Series("", ms, curve[:, 0] * 1e6, "guide"), Series("", ms, curve[:, 1] * 1e6, "faint")]  # fmt: skip
@@ -32,9 +32,9 @@ def _shots(result: Result) -> Figure:
     below = Figure(f"left-{result.axis}", "", "", "time / ms", "left / µm", tuple(left))
     pole = result.estimates["pole"].value
     caption = (
-        f"The first {len(some)} of the shots that were pushed along {result.axis}, from where the currents have come to rest: mean of "
-        f"both planes' readings and the fit of all shots (pole {pole:.1f} 1/s), thin how it tilts (half the planes' difference). Below, "
-        "what the fit leaves of the mean."
+        f"The first {len(some)} of the shots that were pushed along {result.axis}, from where the currents have come to rest: "
+        f"mean of both planes' readings and the fit of all shots (pole {pole:.1f} 1/s), thin how it tilts (half the planes' "
+        "difference). Below, what the fit leaves of the mean."
     )
-    return Figure(f"shots-{result.axis}", f"Shots along {result.axis}", caption, "time / ms", f"{result.axis} / µm", tuple(series),
-                  below=below)  # fmt: skip
+    return Figure(f"shots-{result.axis}", f"Shots along {result.axis}", caption, "time / ms", f"{result.axis} / µm",
+                  tuple(series), below=below)  # fmt: skip

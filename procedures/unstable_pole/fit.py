@@ -15,8 +15,8 @@ the held currents: f = B i + f_0, B and f_0 alike in all shots, without knowing 
 
     cosh(t sqrt L) z0 + sinh(t sqrt L)/sqrt L z0' + (cosh(t sqrt L) - 1)/L f
 
-holds even functions of the root alone: power series of L t^2, whatever its eigenvalues. L is fitted to all shots, with z0 and z0'
-of each and B and f_0 of all projected out (Golub and Pereyra, 1973).
+holds even functions of the root alone: power series of L t^2, whatever its eigenvalues. L is fitted to all shots, with z0
+and z0' of each and B and f_0 of all projected out (Golub and Pereyra, 1973).
 """
 
 from __future__ import annotations
@@ -46,11 +46,14 @@ class Shot:
 
 @dataclass(frozen=True)
 class Release:
-    """`square` L (2, 2) 1/s^2 and its `covariance` (4, 4) by rows; fitted `curves` (n, 2) of each shot; of u and d the rms of
-    what is `left`, and of the readings' `noise` by third differences, m; `dof`."""
+    """`square` L (2, 2) 1/s^2 and its `covariance` (4, 4) by rows; `pushed` B and f_0 (2, p + 1), with the
+    covariance of each row (2, p + 1, p + 1); fitted `curves` (n, 2) of each shot; of u and d the rms of what is `left`, and of
+    the readings' `noise` by third differences, m; `dof`."""
 
     square: Array
     covariance: Array
+    pushed: Array
+    pushed_covariance: Array
     curves: tuple[Array, ...]
     left: tuple[float, float]
     noise: tuple[float, float]
@@ -81,8 +84,8 @@ def release(shots: Sequence[Shot], step_s: float, start: float) -> Release:
     if len(shots) < 8 or few < 4 * STARTS:
         raise AnalysisError(f"found {len(shots)} shots that tell anything; expected 8 or more, of {4 * STARTS} samples")
     problem = _Problem(tuple(shots), step_s, _noise(shots))
-    size = start**2
-    square, before = np.array([size, 0.0, 0.0, size]), np.inf
+    size, before = start**2, np.inf
+    square: Array = np.array([size, 0.0, 0.0, size])
     for _ in range(ROUNDS):
         left, slopes = problem.slopes(square, 1e-5 * size)
         step = np.linalg.lstsq(slopes, left, rcond=None)[0]
@@ -92,12 +95,12 @@ def release(shots: Sequence[Shot], step_s: float, start: float) -> Release:
             break
         if np.abs(step).max() < CLOSE * size or abs(before - left @ left) < 1e-12 * (left @ left):
             return problem.solved(square)
-        before = left @ left
+        before = float(left @ left)
     raise AnalysisError("the shots do not tell how fast they leave their place: the fit does not settle")
 
 
 def _noise(shots: Sequence[Shot]) -> Array:
-    """Of u and d, by third differences: of a smooth curve nothing is left of it, of white noise 1 + 9 + 9 + 1 times its square."""
+    """Of u and d, by third differences: nothing is left of a smooth curve, of white noise 1 + 9 + 9 + 1 times its square."""
     found = np.concatenate([np.diff(s.z, n=3, axis=0) for s in shots])
     noise = np.sqrt(np.mean(found**2, axis=0) / 20)
     if not (noise > 0).all():
@@ -114,10 +117,22 @@ class _Problem:
     noise: Array
 
     def left(self, square: Array) -> Array:
-        """What no start, no force and this L explain (N,): first without the starts of each, then without what the forces of
-        all give."""
+        """What no start, no force and this L explain (N,): without the starts of each, then without what the forces give."""
+        y, x = self.parts(square)
+        return np.asarray(y - x @ self.told(y, x)[0])
+
+    @staticmethod
+    def told(y: Array, x: Array) -> tuple[Array, Array]:
+        """Terms of few columns x of many rows, and the inverse of their normal matrix."""
+        scale = np.sqrt((x**2).sum(axis=0))
+        scale = np.where(scale > 0, scale, 1.0)
+        inverse = np.linalg.pinv((x / scale).T @ (x / scale), rcond=1e-12) / np.outer(scale, scale)
+        return inverse @ (x.T @ y), inverse
+
+    def parts(self, square: Array) -> tuple[Array, Array]:
+        """Readings (N,), and what the forces of all give of them (N, 2 (p + 1)), both without the starts of each."""
         lengths = {len(s.z) for s in self.shots}
-        starts, forces = basis(square.reshape(2, 2), self.step_s * np.arange(max(lengths)))
+        starts, forces = basis(square.reshape(2, 2), self.step_s * np.arange(max(lengths), dtype=np.float64))
         planes = {n: np.linalg.qr((starts[:n] / self.noise[:, None]).reshape(2 * n, STARTS))[0] for n in lengths}
         given = {n: (forces[:n] / self.noise[:, None]).reshape(2 * n, 2) for n in lengths}
         given = {n: g - planes[n] @ (planes[n].T @ g) for n, g in given.items()}
@@ -127,11 +142,7 @@ class _Problem:
             y = (s.z / self.noise).reshape(-1)
             rows.append(y - planes[n] @ (planes[n].T @ y))
             columns.append((given[n][:, :, None] * np.append(s.held, 1.0)).reshape(2 * n, -1))
-        y, x = np.concatenate(rows), np.concatenate(columns)
-        scale = np.sqrt((x**2).sum(axis=0))
-        x = x / np.where(scale > 0, scale, 1.0)
-        told = np.linalg.lstsq(x.T @ x, x.T @ y, rcond=1e-12)[0]  # ten columns of many rows
-        return np.asarray(y - x @ told)
+        return np.concatenate(rows), np.concatenate(columns)
 
     def slopes(self, square: Array, by: float) -> tuple[Array, Array]:
         """What is left (N,), and how that goes with L, the other way round (N, 4)."""
@@ -143,10 +154,14 @@ class _Problem:
         left, slopes = self.slopes(square, 1e-5 * float(np.abs(square).max()))
         forces = 2 * (len(self.shots[0].held) + 1)
         dof = left.size - STARTS * len(self.shots) - forces - 4
-        covariance = np.linalg.inv(slopes.T @ slopes) * float(left @ left) / dof
+        variance = float(left @ left) / dof
+        covariance: Array = np.asarray(np.linalg.inv(slopes.T @ slopes) * variance, np.float64)
+        told, inverse = self.told(*self.parts(square))
+        half = forces // 2
+        each_row = np.array([inverse[:half, :half], inverse[half:, half:]]) * variance
         ends = np.cumsum([len(s.z) for s in self.shots])[:-1]
         each = np.split(left.reshape(-1, 2) * self.noise, ends)
         rms = np.sqrt(left.size / dof * np.mean(np.concatenate(each) ** 2, axis=0))
         curves = tuple(s.z - r for s, r in zip(self.shots, each, strict=True))
-        return Release(square.reshape(2, 2), covariance, curves, (float(rms[0]), float(rms[1])),
-                       (float(self.noise[0]), float(self.noise[1])), dof)  # fmt: skip
+        noises = (float(rms[0]), float(rms[1])), (float(self.noise[0]), float(self.noise[1]))
+        return Release(square.reshape(2, 2), covariance, told.reshape(2, half), each_row, curves, *noises, dof)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from bench.errors import Lacking
 from bench.rigfile import RigFile
-from bench.rigfile.capabilities_of_loops import Hold, HeldAxis
+from bench.rigfile.capabilities_of_loops import HeldAxis, Hold
 from bench.rigfile.places import Places
 from procedures.shared.rates import rate_of
 from procedures.unstable_pole.plan import Plan
@@ -72,16 +72,15 @@ class Foreseen:
 
 
 def foreseen(rig: RigFile, plan: Plan, axis: HeldAxis) -> Foreseen:
-    """From rest x = a (cosh lambda t - 1) with a = 2 K_B i/(K_1 + K_2); x + x'/lambda = a (e^(lambda t) - 1), which at a bound b
-    is less than 2 b + a. A force F catches what has less than F/K of it; zeros of the probes take their part."""
+    """From rest x = a (cosh lambda t - 1) with a = 2 K_B i/(K_1 + K_2); x + x'/lambda = a (e^(lambda t) - 1), which at a bound
+    b is less than 2 b + a. A force F catches what has less than F/K of it; zeros of the probes take their part."""
     can, known = ability(rig), Places(rig).known
     stiff = [known[name].value for name in axis.stiffness]
     pole = math.sqrt(sum(stiff) / known[can.mass].value)
     a = 2 * can.force.value * plan.push_A / sum(stiff)
     grown = pole * plan.hold_s
-    zeros = [t.value for t in (rig.sensors[c].offset for c in axis.positions if c in rig.sensors)]
-    spread = [math.sqrt(3) * rig.sensors[c].offset.standard_uncertainty for c in axis.positions if c in rig.sensors]
-    off = max((abs(z) + s for z, s in zip(zeros, spread, strict=True)), default=0.0)
+    zeros = [rig.sensors[c].offset for c in axis.positions if c in rig.sensors]
+    off = max((abs(t.value) + math.sqrt(3) * t.standard_uncertainty for t in zeros), default=0.0)
     most = max(known[name].value + math.sqrt(3) * known[name].standard_uncertainty for name in axis.stiffness)
     reach = rig.parameters[can.limit].default / most - off
     return Foreseen(pole, a * (math.cosh(grown) - 1), a * math.expm1(grown), 2 * plan.bound_m + a, reach)

@@ -1,7 +1,7 @@
-"""The unstable pole of a shaft in magnetic bearings that pull it away: currents held for some milliseconds, and what it does then.
+"""The unstable pole of a shaft in magnetic bearings that pull it away: currents held for some ms, and what it does then.
 
-Measurand, by axis: `pole`, sqrt((K_1 + K_2)/m) of the negative stiffnesses of both planes, at rest at the middle of the readings,
-with its centre of mass in the middle between the planes. No force constant and no position gain is used: `fit` says why.
+Measurand, by axis: `pole`, sqrt((K_1 + K_2)/m) of the negative stiffnesses of both planes, with the centre of mass in
+the middle between them. No force constant and no position gain is used: `fit` says why.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from procedures.unstable_pole.steps import STATE, STEP, read_taken
 
 POLE = Quantity("pole", "rad/s", "how fast both planes leave their place together, held currents: sqrt((K_1 + K_2)/m)",
                 title="unstable pole")  # fmt: skip
-STIFFNESS = Quantity("stiffness", "N/m", "negative stiffness of both planes together, computed: pole squared times the stated mass",
+STIFFNESS = Quantity("stiffness", "N/m", "of both planes together, negative; computed: pole squared times the stated mass",
                      title="negative stiffness, computed")  # fmt: skip
 MEASURES = (POLE, STIFFNESS)
 SIGNS = (1.0, -1.0, -1.0, 1.0)
@@ -147,11 +147,11 @@ def _caught(rig: RigFile, plan: Plan, axis: str) -> Iterator[str]:
         yield (f"push_A: {plan.push_A:g} A for {plan.hold_s * 1e3:g} ms take {axis} {f.travel * 1e6:.0f} µm off by a pole of "
                f"{f.pole:.0f} 1/s, with a rate that makes it {f.to_catch * 1e6:.0f} µm; expected {catch}, or less")  # fmt: skip
     if f.at_bound > SPARE * f.reach:
-        yield (f"bound_m: a reading of {plan.bound_m * 1e6:g} µm goes on as if it were {f.at_bound * 1e6:.0f} µm; expected {catch}, "
-               "or less")  # fmt: skip
+        yield (f"bound_m: a reading of {plan.bound_m * 1e6:g} µm goes on as if it were {f.at_bound * 1e6:.0f} µm; expected "
+               f"{catch}, or less")  # fmt: skip
     limit = rig.envelope.max_levitated_position_m
-    if limit is not None and f.reach > limit:
-        yield f"envelope.max_levitated_position_m: found {limit * 1e6:g} µm; expected what a catch takes, {f.reach * 1e6:.0f} µm"
+    if max(f.travel, f.at_bound) > limit:
+        yield f"bound_m: a shot goes {max(f.travel, f.at_bound) * 1e6:.0f} µm; the envelope allows {limit * 1e6:g} µm"
 
 
 def requires(rig: RigFile) -> Requires:

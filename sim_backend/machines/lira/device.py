@@ -10,14 +10,13 @@ from typing import Final
 from sim_backend.core.plant import Array
 from sim_backend.machines.lira.captures import Captures
 from sim_backend.machines.lira.plant import DQ, FAULTS, POSITION_TICKS, STATES, TICKS_S, WHOLE, Plant
-from sim_backend.machines.lira.settings import AXES_OF_LINE, BY_NAME, MEASUREMENTS, SETTINGS
+from sim_backend.machines.lira.settings import AXES_OF_LINE, BY_NAME, LONGEST_HOLD_S, MEASUREMENTS, SETTINGS
 from sim_backend.machines.lira.shell import PROMPT, Refused, Shell, number, single
 from sim_backend.machines.lira.streamed import Streamed
 
 RATES: Final = (115_200, 921_600, 3_000_000)
 RESTING: Final = ("OFF", "IDLE")
 AT_ONCE: Final = ("lift", "land", "stop", "clear", "safe")
-LONGEST_HOLD_S: Final = 6e-3
 BANNER: Final = "lira firmware 1.0"
 SWITCHES: Final = ("echo", "prompt", "checksum", "event")
 SWITCHED: Final = {"checksum": "checksums", "event": "events"}
@@ -47,8 +46,8 @@ class Device:
         self._verbs: dict[str, Callable[..., Iterable[str | bytes]]] = {
             "id": self._id, "stat": self._stat, "meas": self._meas, "list": self._list, "get": self._get, "set": self._set,
             "default": self._default, "save": self._save, "on": self._on, "ref": self._ref, "halt": self._halt,
-            "step": self._step, "inj": self._inj, "hold": self._hold, "hb": self._hb, "stream": self.streamed.do, "baud": self._baud,
-            "cap": self._captures.do,
+            "step": self._step, "inj": self._inj, "hold": self._hold, "hb": self._hb, "stream": self.streamed.do,
+            "baud": self._baud, "cap": self._captures.do,
         }  # fmt: skip
         self._verbs |= {name: self._switch(name) for name in SWITCHES}
         self._verbs |= {name: self._command(name) for name in AT_ONCE}
@@ -257,7 +256,7 @@ class Device:
         return [f"{words[0]} {words[1]} {amplitude:.9g} {hz:.9g}"]
 
     def _hold(self, *words: str) -> Iterable[str]:
-        """The bearings' currents stay, with a push along x or y on top, until the time is over or a reading leaves the bound."""
+        """The bearings' currents stay, those along x or y pushed, until the time is over or a reading leaves the bound."""
         if len(words) != 3 or words[0] not in ("x", "y"):
             raise Refused(2, "x|y amperes seconds")
         amperes, seconds = number(words[1]), number(words[2])

@@ -18,12 +18,20 @@ int32_t lira_hold(const lira_control *c, lira_state *st, int32_t across, double 
     return 0;
 }
 
+/* Of a plane and axis: whether its reading has left the bound, or so much of its limit would be needed to catch it there that there
+ * is little to spare. From rest it takes F = F_0 - K x to stand at x; on its way out x'/lambda nears x, and it takes F_0 - 2 K x. */
+static int leaves(const lira_control *c, const lira_state *st, int k) {
+    int y = k % 2, j = (y ? Y1 : X1) + k / 2;
+    double rest = c->model_bearing * st->mean[k] - (y ? c->model_mass / 2 * c->gravity : 0);
+    double needed = rest - 2 * c->model_pull * (st->read[j] - st->ref[j]);
+    return fabs(st->read[j]) > c->hold_bound_m || fabs(needed) > c->hold_share * c->sat_b;
+}
+
 /* at every reading of the positions, before the loops */
 void lira_hold_on(const lira_control *c, lira_state *st) {
     if (!st->held) return;
-    double far = 0;
-    for (int k = 0; k < 4; k++) far = most(far, fabs(st->read[k]));
-    int out = far > c->hold_bound_m;
+    int out = 0;
+    for (int k = 0; k < 4; k++) out |= leaves(c, st, k);
     st->hold_ended = out;
     st->held = out || st->mode != LIRA_LEVITATED ? 0 : st->held - 1;
 }

@@ -40,7 +40,7 @@ typedef struct {
     double psi_rot, psi_lin, zero_ra1, zero_ra2, zero_la, one_zero; /* Wb, rad electrical; 1: the first for both */
     double model_l_rot, model_l_lin, model_l_f, model_c;
     double inject_axis, inject_place, inject_amplitude, inject_hz;
-    double hold_bound_m, hold_most_s, hold_mean_s, hold_planes; /* bits: planes that a hold pushes */
+    double hold_bound_m, hold_most_s, hold_mean_s, hold_share, hold_planes; /* bits: planes that a hold pushes */
     double z_lift, v_lift, v_land, z_off, gate_m, gate_s, refuse_m, lost_m, lost_s, trip_A, supply_V, watchdog_s, rest_s; /* after the way down */
 } lira_control;
 

@@ -15,7 +15,7 @@ from sim_backend.machines.lira.controller import LineController, SpokenControlle
 from sim_backend.machines.lira.operator import Attendant
 from sim_backend.machines.lira.params import COILS, ControlParams, Each, PlantParams
 from sim_backend.machines.lira.plant import DQ, TICKS_S, Plant
-from sim_backend.machines.lira.settings import BY_NAME, HELD, INJECTED
+from sim_backend.machines.lira.settings import BY_NAME, HELD, INJECTED, LONGEST_HOLD_S
 from sim_backend.machines.lira.truth_current_step import currents
 from sim_backend.machines.lira.truth_loops import loops
 from sim_backend.machines.lira.truth_mission import mission
@@ -123,8 +123,10 @@ def params(v: Numbers, d: Numbers) -> Built:
         filter_r=v["filter_resistance"], supply=v["supply"], clearance=v["geometry.clearance"],
         ring_friction=v["ring_friction"],
     )  # fmt: skip
-    control = ControlParams(observer_pull=0.0 if d["no_pull"] else 1.0, one_zero=d["one_zero"],
-                            hold_planes=1.0 if d["hold_one_plane"] else 3.0, hold_most_s=0.0 if d["hold_deaf"] else 6e-3)  # fmt: skip
+    control = ControlParams(
+        observer_pull=0.0 if d["no_pull"] else 1.0, one_zero=d["one_zero"],
+        hold_planes=1.0 if d["hold_one_plane"] else 3.0, hold_most_s=0.0 if d["hold_deaf"] else LONGEST_HOLD_S,
+    )  # fmt: skip
     factors = {name: d[f"factor_{name}"] for name in FACTORS if d[f"factor_{name}"] != 1}
     return Built(plant, control, v["reduced"] != 0, v["rest_angle"], factors)
 

@@ -67,6 +67,7 @@ SETTINGS: Final = (
 )
 INJECTED: Final = ("inject_axis", "inject_place", "inject_amplitude", "inject_hz")
 """What the line's `inj` says, by the names that rig files may have for it."""
+LONGEST_HOLD_S: Final = 6e-3
 HELD: Final = ("hold_across", "hold_A", "hold_s")
 """What its `hold` says, likewise."""
 BY_NAME: Final = {s.name: s for s in SETTINGS}
