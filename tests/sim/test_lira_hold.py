@@ -70,7 +70,7 @@ def test_a_reading_at_the_bound_ends_it() -> None:
 
 
 def test_a_force_at_rest_ends_it_sooner() -> None:
-    """20 um off the middle of their pull 7.5 N are needed at rest: of 0.75 x 26.2 N are left 12.15 N, which is 2 K x at 16 um."""
+    """20 um off the middle of their pull 7.5 N hold it: of 0.75 x 26.2 N are left 12.15 N, which is 2 K x at 16 um."""
     farther = []
     for centre in (0.0, 20e-6):
         device = flying(centre=(centre, centre, 0.0, 0.0))
