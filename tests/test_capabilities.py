@@ -113,9 +113,13 @@ def test_a_plain_controller_of_schema_1_can_do_what_its_parameters_say() -> None
             '{ channel = "limit", mask = 16 }',
             "loop_injection.loops.z.limited.channel",
         ),
+        ('held = "held"\n', 'held = "helt"\n', "hold.held"),
+        ('mass = "machine/mass"\nlimit', 'mass = "machine/mas"\nlimit', "hold.mass"),
+        ('x = { value = 0, positions = ["x1"', 'x = { value = 3, positions = ["x1"', "hold.axes.x.value"),
+        ('currents = ["i_q_B1", "i_q_B2"], stiff', 'currents = ["y1", "i_q_B2"], stiff', "hold.axes.y.currents"),
     ],
 )
-def test_loops_into_which_sines_are_injected(old: str, new: str, key: str) -> None:
+def test_loops_and_holds_that_lead_nowhere(old: str, new: str, key: str) -> None:
     toml, dbc = (Path("rigs") / "lira.toml").read_text(), (Path("rigs") / "lira.dbc").read_text()
     assert toml.count(old) == 1
     found = [p.key for p in problems_of(RigFile.parse(toml.replace(old, new), dbc))]

@@ -12,7 +12,7 @@ from typing import Any, Literal
 from pydantic import Field, model_validator
 
 from bench.rigfile.bit import Bit
-from bench.rigfile.capabilities_of_loops import CurrentStep, LoopInjection, Motion
+from bench.rigfile.capabilities_of_loops import CurrentStep, Hold, LoopInjection, Motion
 from bench.rigfile.elements import Name
 from bench.rigfile.part import Part
 from bench.rigfile.toleranced import Toleranced
@@ -145,6 +145,7 @@ class Capabilities(Part):
     settings: Mapping[Name, Mapping[Name, Mapping[str, float]]] = {}
     angle: Holding | None = None
     motion: Motion | None = None
+    hold: Hold | None = None
     motor: MotorForce = MotorForce()
     gains: Gains = Gains()
     flatness: Mapping[Name, Flatness] = {}
@@ -171,6 +172,8 @@ class Capabilities(Part):
 
 MOVED = ("place", "place_rate", "place_rise", "angle", "angle_rate", "angle_rise", "gate", "gate_time")
 """Keys of a motion that are parameters."""
+HELD = ("begin", "across", "push", "bound", "limit")
+"""Those of a hold."""
 STEP_PARAMETERS = ("parameter", "gain", "current_limit")
 
 
@@ -201,6 +204,8 @@ def _tables(c: Capabilities) -> Iterator[tuple[str, str | Mapping[str, str]]]:
         yield from ((f"angle.{key}", value) for key, value in angle)
     if c.motion is not None:
         yield from ((f"motion.{key}", getattr(c.motion, key)) for key in MOVED)
+    if c.hold is not None:
+        yield from ((f"hold.{key}", getattr(c.hold, key)) for key in HELD)
     yield from ((f"motor.{key}", value) for key, value in c.motor)
     yield from ((f"gains.{key}", value) for key, value in c.gains)
     for law, flat in c.flatness.items():

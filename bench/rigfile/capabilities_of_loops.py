@@ -11,6 +11,7 @@ from pydantic import Field
 from bench.rigfile.bit import Bit
 from bench.rigfile.elements import Name
 from bench.rigfile.part import Part
+from bench.rigfile.toleranced import Toleranced
 
 InjectionPlace = Literal["sensor", "reference", "force"]
 
@@ -65,6 +66,38 @@ class Motion(Part):
     gate: str = ""
     gate_time: str = ""
     currents: tuple[str, ...] = ()
+
+
+class HeldAxis(Part):
+    """A direction in which a hold pushes: `value` of the parameter that chooses it; of the two planes, in their order, channels
+    of captures that read their `positions` and the `currents` that push there, and places of the stated negative `stiffness`,
+    N/m."""
+
+    value: float
+    positions: tuple[str, str]
+    currents: tuple[str, str]
+    stiffness: tuple[str, str]
+
+
+class Hold(Part):
+    """Currents of magnetic bearings that the controller keeps at their means, while the shaft leaves its place as the magnets
+    pull it; it catches it again by itself. To set the parameter `begin`, s, begins one of so long, at most the greatest value
+    of it; `across` chooses a direction by the `value` of `axes`, `push`, A, is put on top of the currents of both planes there;
+    a radial reading beyond `bound`, m, ends it. `held`: the channel of captures that is 1 meanwhile. What tells what is caught:
+    `limit`, the parameter of the greatest force of a plane and axis, N; the stated `force` of a plane's current, N/A; `mass`,
+    the place of that of what is held. `middle`: where its centre of mass is
+    in the middle between both planes of probes, by the set point along it."""
+
+    begin: str
+    across: str
+    push: str
+    bound: str
+    held: str
+    limit: str
+    force: Toleranced
+    mass: str
+    middle: Toleranced | None = None
+    axes: Mapping[Name, HeldAxis] = Field(min_length=1)
 
 
 class CurrentStep(Part):

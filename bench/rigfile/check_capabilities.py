@@ -10,6 +10,7 @@ from bench.rigfile.bit import Bit
 from bench.rigfile.capabilities import parameters_named
 from bench.rigfile.check_current_steps import near
 from bench.rigfile.check_current_steps import problems_of as problems_of_current_steps
+from bench.rigfile.check_hold import problems_of as problems_of_hold
 from bench.rigfile.model import RigFile
 from bench.rigfile.places import Places
 
@@ -30,6 +31,7 @@ def problems_of(rig: RigFile) -> Iterator[Problem]:
         *_delay(rig),
         *_angle(rig),
         *problems_of_current_steps(rig),
+        *problems_of_hold(rig),
     ):
         yield Problem(rig.path, f"capabilities.{key}", found, expected)
 
@@ -44,6 +46,7 @@ KINDS = {"set_points.axes": "m", "set_points.slew": "m/s", "set_points.slew_tilt
          "bias": "A", "angle.ref": "rad", "angle.slew": "rad/s", "angle.speed": "rad/s",
          "motion.place": "m", "motion.place_rate": "m/s", "motion.place_rise": "m/s^2", "motion.angle": "rad",
          "motion.angle_rate": "rad/s", "motion.angle_rise": "rad/s^2", "motion.gate": "m", "motion.gate_time": "s",
+         "hold.begin": "s", "hold.push": "A", "hold.bound": "m", "hold.limit": "N",
          "motor.phase_slew": "rad/s", "motor.phase_limit": "rad", "motor.circle": "m", "motor.circle_hz": "Hz",
          "current_limit": "A", "landing_speed": "rad/s", "lift_time": "s", "watchdog": "s"}  # fmt: skip
 COORDINATES = {"x": "m", "y": "m", "z": "m", "psi": "rad", "theta": "rad"}

@@ -148,3 +148,8 @@ CURRENT_STEP = (
     "standstill the currents are the same to the last digit. The order of the phases and the zeros are other tests'.",
     "A coil of the linear winding that is reversed and stands where its current gives no force: it pushes nothing there.",
 )
+UNSTABLE_POLE = (
+    "Magnets that pull by more than in proportion to the way: shots of 15 µm tell a mean over them. A pull that is 1 % "
+    "stiffer at 20 µm than at the middle changes the pole by about 0.3 %.",
+    "Another place along the shaft: the pole is that of planes which pull as they do where it was measured.",
+)

@@ -111,7 +111,7 @@ def test_lists_name_every_parameter_and_channel() -> None:
     assert [line.split()[1] for line in host.more] == [s.name for s in SETTINGS]
     host.ask("list", "chan")
     assert [line.split()[1] for line in host.more] == [m.name for m in MEASUREMENTS]
-    assert len(host.more) == 63
+    assert len(host.more) == 64
 
 
 def test_every_parameter_is_got_as_it_was_set() -> None:

@@ -104,10 +104,13 @@ class Capture:
         if self.trigger == "now" or (self.trigger == "step" and self.stepped):
             return self.samples
         if self.trigger == "level":
-            watched = counts[:, self.channel]
+            last = (
+                self._kept[-1][-1:, self.channel] if self._kept else counts[:1, self.channel]
+            )  # a rise may lie between two calls
+            watched = np.concatenate([last, counts[:, self.channel]])
             rises = np.flatnonzero((watched[1:] >= self.level) & (watched[:-1] < self.level))
             if len(rises):
-                return self.samples + int(rises[0]) + 1
+                return self.samples + int(rises[0])
         return None
 
     def blocks(self, offset: int, length: int) -> Iterator[bytes]:

@@ -10,7 +10,7 @@ from typing import Final
 from sim_backend.core.plant import Array
 from sim_backend.machines.lira.captures import Captures
 from sim_backend.machines.lira.plant import DQ, FAULTS, POSITION_TICKS, STATES, TICKS_S, WHOLE, Plant
-from sim_backend.machines.lira.settings import AXES_OF_LINE, BY_NAME, MEASUREMENTS, SETTINGS
+from sim_backend.machines.lira.settings import AXES_OF_LINE, BY_NAME, LONGEST_HOLD_S, MEASUREMENTS, SETTINGS
 from sim_backend.machines.lira.shell import PROMPT, Refused, Shell, number, single
 from sim_backend.machines.lira.streamed import Streamed
 
@@ -39,14 +39,15 @@ class Device:
         self._started, self._beat = 0, ""
         self._rows: Array = plant.run(1 / 35000, whole=True)
         self._told = (plant.state, plant.fault)
+        self._holding = False
         self._captures = Captures()
         self.streamed = Streamed()
         """Slow telemetry: blocks that wait to be sent."""
         self._verbs: dict[str, Callable[..., Iterable[str | bytes]]] = {
             "id": self._id, "stat": self._stat, "meas": self._meas, "list": self._list, "get": self._get, "set": self._set,
             "default": self._default, "save": self._save, "on": self._on, "ref": self._ref, "halt": self._halt,
-            "step": self._step, "inj": self._inj, "hb": self._hb, "stream": self.streamed.do, "baud": self._baud,
-            "cap": self._captures.do,
+            "step": self._step, "inj": self._inj, "hold": self._hold, "hb": self._hb, "stream": self.streamed.do,
+            "baud": self._baud, "cap": self._captures.do,
         }  # fmt: skip
         self._verbs |= {name: self._switch(name) for name in SWITCHES}
         self._verbs |= {name: self._command(name) for name in AT_ONCE}
@@ -116,6 +117,9 @@ class Device:
         if now[1] != self._told[1] and now[1] != FAULTS[0]:
             self.shell.tell(self.tick, "fault", now[1])
         self._told = now
+        if self._holding and not self.plant.held:
+            self.shell.tell(self.tick, "hold", "bound" if self.plant.hold_left_bound else "over")
+        self._holding = self.plant.held
 
     def _switch(self, field: str) -> Callable[..., Iterable[str]]:
         def switch(*words: str) -> Iterable[str]:
@@ -250,6 +254,18 @@ class Device:
                             ("inject_axis", float(tuple(AXES_OF_LINE).index(words[0])))):  # fmt: skip
             self.plant.set(name, value)
         return [f"{words[0]} {words[1]} {amplitude:.9g} {hz:.9g}"]
+
+    def _hold(self, *words: str) -> Iterable[str]:
+        """The bearings' currents stay, those along x or y pushed, until the time is over or a reading leaves the bound."""
+        if len(words) != 3 or words[0] not in ("x", "y"):
+            raise Refused(2, "x|y amperes seconds")
+        amperes, seconds = number(words[1]), number(words[2])
+        if not -2 <= amperes <= 2 or not 0 <= seconds <= LONGEST_HOLD_S:
+            raise Refused(3, f"-2..2 A, 0..{LONGEST_HOLD_S:g} s")
+        if self.plant.hold(words[0], amperes, seconds):
+            raise Refused(4, f"state={self.plant.state}")
+        self._holding = self.plant.held
+        return [f"hold={seconds:.9g} s {words[0]} {amperes:.9g} A"]
 
     def _halt(self, *words: str) -> Iterable[str]:
         """Angle and z stay where they come to rest when they are braked now."""

@@ -40,6 +40,7 @@ typedef struct {
     double psi_rot, psi_lin, zero_ra1, zero_ra2, zero_la, one_zero; /* Wb, rad electrical; 1: the first for both */
     double model_l_rot, model_l_lin, model_l_f, model_c;
     double inject_axis, inject_place, inject_amplitude, inject_hz;
+    double hold_bound_m, hold_most_s, hold_mean_s, hold_share, hold_planes; /* bits: planes that a hold pushes */
     double z_lift, v_lift, v_land, z_off, gate_m, gate_s, refuse_m, lost_m, lost_s, trip_A, supply_V, watchdog_s, rest_s; /* after the way down */
 } lira_control;
 
@@ -58,6 +59,8 @@ typedef struct {
     double star[5][216];                     /* exact step: columns of twelve for twelve states, three u_sw, three emfs */
     int32_t member[5][3];                    /* half-bridges of each star */
     int32_t currents_on, bearings_on, angle_on, axial_on, fresh, limited;
+    double mean[4], frozen[4]; /* slow means of the bearings' references B1 d, q, B2 d, q; what a hold keeps them at */
+    int32_t held, hold_ended;  /* readings that a hold still has; why the last one ended: 0 its time, 1 a reading left the bound */
     double target[6], speed[6], rise[6]; /* where set points go, m or rad, and how fast at most */
     int32_t mode, fault, gate_clock, lost_clock, off_after; /* off_after: a landing ends without currents */
     int64_t heard; /* tick of the last heartbeat; -1: none is waited for */
@@ -67,6 +70,7 @@ typedef struct {
 
 void lira_start(const lira_params *, lira_state *, uint64_t seed);
 int32_t lira_command(const lira_params *, const lira_control *, lira_state *, int32_t command);
+int32_t lira_hold(const lira_control *, lira_state *, int32_t across, double amperes, double seconds);
 int64_t lira_run(const lira_params *, const lira_control *, lira_state *, int64_t ticks, double *trace, int64_t every, int32_t whole);
 int64_t lira_run_reduced(const lira_params *, const lira_control *, lira_state *, int64_t ticks, double *trace, int64_t every,
                          int32_t whole);
@@ -79,7 +83,7 @@ void lira_coils(const double *dq, double cos_phase, double sin_phase, double *co
 #define SYSTEMS 5
 #define POLE_PAIRS 8
 #define LIRA_TRACE 70
-#define LIRA_WHOLE (LIRA_TRACE + 3 * BRIDGES + 2)
+#define LIRA_WHOLE (LIRA_TRACE + 3 * BRIDGES + 3)
 #define STEP_S (LIRA_TICK * POSITION_TICKS)
 enum { LIRA_OFF, LIRA_IDLE, LIRA_CURRENT, LIRA_LIFT, LIRA_LEVITATED, LIRA_LANDING, LIRA_FAULT };
 enum { DO_IDLE, DO_ON, DO_LIFT, DO_LAND, DO_STOP, DO_CLEAR, DO_SAFE };
@@ -105,5 +109,7 @@ void lira_sight(const lira_params *, lira_state *, double step_s, double keep);
 double lira_kept(const lira_params *, double step_s);
 void lira_positions(const lira_params *, const lira_control *, lira_state *);
 void lira_supervise(const lira_params *, const lira_control *, lira_state *);
+void lira_hold_on(const lira_control *, lira_state *);
+void lira_frozen(const lira_control *, lira_state *, double weight);
 void lira_currents(const lira_params *, const lira_control *, lira_state *);
 #endif

@@ -77,6 +77,7 @@ static INLINE int64_t tell_row(const lira_params *p, const lira_state *st, doubl
     memcpy(out + LIRA_TRACE + 2 * BRIDGES, st->coil_read, sizeof st->coil_read);
     out[LIRA_TRACE + 3 * BRIDGES] = p->supply;
     out[LIRA_TRACE + 3 * BRIDGES + 1] = st->heard >= 0 ? (double)(st->tick - st->heard) * LIRA_TICK : -1;
+    out[LIRA_TRACE + 3 * BRIDGES + 2] = st->held > 0;
     return LIRA_WHOLE;
 }
 

@@ -15,7 +15,7 @@ from sim_backend.machines.lira.controller import LineController, SpokenControlle
 from sim_backend.machines.lira.operator import Attendant
 from sim_backend.machines.lira.params import COILS, ControlParams, Each, PlantParams
 from sim_backend.machines.lira.plant import DQ, TICKS_S, Plant
-from sim_backend.machines.lira.settings import BY_NAME, INJECTED
+from sim_backend.machines.lira.settings import BY_NAME, HELD, INJECTED, LONGEST_HOLD_S
 from sim_backend.machines.lira.truth_current_step import currents
 from sim_backend.machines.lira.truth_loops import loops
 from sim_backend.machines.lira.truth_mission import mission
@@ -42,13 +42,15 @@ DEFECTS = {
     "coil_reversed": 0.0, "exchange_phases": 0.0, "exchange_actuators": 0.0, "zero_off_ra": 0.0, "zero_off_la": 0.0,
     "one_zero": 0.0, "adc_late_s": 0.0, "no_pull": 0.0, "position_sign_x1": 1.0, "position_sign_y1": 1.0,
     "factor_kp_s": 1.0, "factor_kp_sl": 1.0, "factor_kp_v": 1.0, "factor_current_max": 1.0, "capacitance_factor": 1.0,
+    "hold_one_plane": 0.0, "hold_deaf": 0.0,
 }  # fmt: skip
 """Planted defects and their harmless values. `coil_reversed`: number of the coil that is connected the other way round;
 `exchange_phases`: b and c of rotary actuator 1 or 2, or of both (3), exchanged at the terminals; `exchange_actuators`: 1, the
 half-bridges of one drive the other; `zero_off_*` rad electrical: encoder turned or moved after its zero was set; `one_zero`: 1,
 the firmware takes the zero of the first rotary actuator for both; `adc_late_s`: of the half-bridges' readings; `no_pull`: 1,
 the observers do not know the negative stiffness; `position_sign_*`: of a probe; `factor_*`: what the firmware has of
-a gain or a limit that it was told; `capacitance_factor`: of every capacitor, beside what it was drawn with."""
+a gain or a limit that it was told; `capacitance_factor`: of every capacitor, beside what it was drawn with; `hold_one_plane`:
+1, a hold pushes the first plane alone; `hold_deaf`: 1, a hold is answered and does not come."""
 FACTORS: Final = ("kp_s", "kp_sl", "kp_v", "current_max")
 ELECTRICAL: Final = (
     "coil_reversed",
@@ -121,7 +123,10 @@ def params(v: Numbers, d: Numbers) -> Built:
         filter_r=v["filter_resistance"], supply=v["supply"], clearance=v["geometry.clearance"],
         ring_friction=v["ring_friction"],
     )  # fmt: skip
-    control = ControlParams(observer_pull=0.0 if d["no_pull"] else 1.0, one_zero=d["one_zero"])
+    control = ControlParams(
+        observer_pull=0.0 if d["no_pull"] else 1.0, one_zero=d["one_zero"],
+        hold_planes=1.0 if d["hold_one_plane"] else 3.0, hold_most_s=0.0 if d["hold_deaf"] else LONGEST_HOLD_S,
+    )  # fmt: skip
     factors = {name: d[f"factor_{name}"] for name in FACTORS if d[f"factor_{name}"] != 1}
     return Built(plant, control, v["reduced"] != 0, v["rest_angle"], factors)
 
@@ -272,7 +277,7 @@ LIRA = Machine(
     copper_W=copper_W,
     operator=operator,
     daily=DAILY,
-    controls=frozenset((*BY_NAME, *INJECTED)) | SENT | {f"step_{name}" for name in DQ},
+    controls=frozenset((*BY_NAME, *INJECTED, *HELD)) | SENT | {f"step_{name}" for name in DQ},
     tick_s=1 / TICKS_S,
     period_s=PERIOD_S,
     motions=Motions(mission=mission, currents=currents, loops=loops),

@@ -158,6 +158,11 @@ class ControlParams:
     inject_place: float = 1.0
     inject_amplitude: float = 0.0
     inject_hz: float = 100.0
+    hold_bound_m: float = 20e-6  # stand-in: a reading beyond it ends a hold
+    hold_most_s: float = 6e-3
+    hold_mean_s: float = 0.1  # stand-in: time constant of the mean that a hold keeps
+    hold_share: float = 0.75  # stand-in: of the bearings' limit that a catch may take
+    hold_planes: float = 3.0  # bits: 1 the first plane, 2 the second one
     z_lift: float = 8e-3  # stand-in: where it is lifted to, out of the rings
     v_lift: float = 0.02
     v_land: float = 0.01  # L VI-B, as the next four

@@ -33,9 +33,9 @@ TRACE: Final = (
 """Of one tick: readings, true places of the sensors' targets; as the firmware has them dq coil currents, capacitor voltages,
 inductor currents and references, the forces it wants, the rates it sees; what rings bear, limited loops, what is injected;
 state and fault; the injected sine as a share of its amplitude."""
-WHOLE: Final = (*TRACE, *MEASURED[:46], "heard")
+WHOLE: Final = (*TRACE, *MEASURED[:46], "heard", "held")
 """With the half-bridges' measurements and the supply, too, and how long ago the host's last heartbeat was, s; -1 while none is
-waited for."""
+waited for; 1 while the bearings' currents are held."""
 
 _ffi, _lib = open_core(Path(__file__).with_name("lira.h"))
 
@@ -139,6 +139,20 @@ class Plant:
     def step(self, name: str, amperes: float) -> None:
         """What is added to a dq reference, such as `d_R1`."""
         self._s.manual[DQ.index(name)] = amperes
+
+    def hold(self, across: str, amperes: float, seconds: float) -> int:
+        """Hold the bearings' currents for so long, those along `x` or `y` pushed by A: 0 done, 1 not in this state."""
+        return int(_lib.lira_hold(self._c, self._s, "xy".index(across), amperes, seconds))
+
+    @property
+    def held(self) -> bool:
+        """Whether the bearings' currents are held."""
+        return bool(self._s.held)
+
+    @property
+    def hold_left_bound(self) -> bool:
+        """Whether a reading that left the bound ended the last hold."""
+        return bool(self._s.hold_ended)
 
     def put(self, **places: float) -> None:
         """Put the mover somewhere, for tests: x, y, alpha, beta, z, angle in m and rad, with rates `x_rate` and so on."""

@@ -87,6 +87,7 @@ static INLINE double loop(const lira_control *c, lira_state *st, int j, int on, 
     double rate = st->ref_rate[j] + (place == 1 ? tone_rate : 0);
     observe(c, st, j, &g, y, on ? st->force[j] : 0);
     if (!on) return st->summed[j] = 0;
+    if (j < Z && st->held) return st->force[j]; /* which its frozen current gives; the integrator waits */
     double e = r - y, wanted = g.kp * e + st->summed[j] + g.kd * (rate - st->seen_rate[j]);
     double force = clip(wanted, -g.limit, g.limit);
     if (force != wanted) st->limited |= 1 << j;
@@ -112,6 +113,7 @@ void lira_positions(const lira_params *p, const lira_control *c, lira_state *st)
         for (int j = 0; j < 6; j++) st->was[j] = st->seen[j] = st->read[j];
     st->fresh = st->limited = 0;
     lira_supervise(p, c, st);
+    lira_hold_on(c, st);
     int on[6] = {st->bearings_on, st->bearings_on, st->bearings_on, st->bearings_on, st->axial_on, st->angle_on};
     for (int j = 0; j < 6; j++) {
         double extra = (int)c->inject_axis == j && (int)c->inject_place == 2 && on[j] ? tone : 0;
@@ -125,6 +127,7 @@ void lira_positions(const lira_params *p, const lira_control *c, lira_state *st)
         st->wanted[4 * a + 2] = st->force[X1 + a] / c->model_bearing;
         st->wanted[4 * a + 3] = up / c->model_bearing;
     }
+    lira_frozen(c, st, weight);
     double axial = st->force[Z] + (st->axial_on ? c->model_cogging_force * sin(2 * TWO_PI / c->model_pitch * st->read[Z]) : 0);
     double torque = st->force[ANGLE] + (st->angle_on ? c->model_cogging_torque * sin(6 * POLE_PAIRS * st->read[ANGLE]) : 0);
     st->wanted[1] = st->wanted[5] = torque / (2 * c->model_torque);

@@ -63,9 +63,13 @@ SETTINGS: Final = (
     Setting("v.land", "v_land", "m/s", 0, 0.1),
     Setting("watchdog_s", "watchdog_s", "s", 0.02, 10),
     Setting("u.dc", "supply_V", "V", 48, 450),
+    Setting("hold.bound", "hold_bound_m", "m", 0, 5e-5),
 )
 INJECTED: Final = ("inject_axis", "inject_place", "inject_amplitude", "inject_hz")
 """What the line's `inj` says, by the names that rig files may have for it."""
+LONGEST_HOLD_S: Final = 6e-3
+HELD: Final = ("hold_across", "hold_A", "hold_s")
+"""What its `hold` says, likewise."""
 BY_NAME: Final = {s.name: s for s in SETTINGS}
 AXES_OF_LINE: Final = {"x1": "x1", "x2": "x2", "y1": "y1", "y2": "y2", "z": "z", "gamma": "angle"}
 
@@ -97,5 +101,7 @@ INNER: Final = tuple(Measurement(f"i_{name}", f"i_{name}", "A", 1e-3) for name i
 """The firmware's own dq currents."""
 WAVE: Final = Measurement("wave", "wave", "1", 2**-15)
 """The sine that is injected, as a share of its amplitude."""
-MEASUREMENTS: Final = (*(_measurement(c) for c in MEASURED), *INNER, WAVE)
+HOLDS: Final = Measurement("held", "held", "1", 1.0)
+"""1 while the bearings' currents are held."""
+MEASUREMENTS: Final = (*(_measurement(c) for c in MEASURED), *INNER, WAVE, HOLDS)
 """The 52 and the firmware's own, in the order of a capture's mask, the first one in its lowest bit."""
