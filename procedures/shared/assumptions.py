@@ -148,3 +148,11 @@ CURRENT_STEP = (
     "standstill the currents are the same to the last digit. The order of the phases and the zeros are other tests'.",
     "A coil of the linear winding that is reversed and stands where its current gives no force: it pushes nothing there.",
 )
+ACTUATOR_CONSTANT = (
+    "What is moved is the mass, and what is turned the inertia, of the rig file: an error of either changes its constants by "
+    "its share, and K_over_J and the ratio not at all. Only a known ring on the shaft would show it.",
+    "An encoder's zero that is off by more than its tolerance takes its cosine: 10° electrical read 1.5 % less, in either "
+    "sign. Set the zero first.",
+    "Time is the controller's: a clock that is fast by 1e-4 changes constants by 2e-4.",
+    "A scale of the position beyond its certificate changes the constants along by its share.",
+)
