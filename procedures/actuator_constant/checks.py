@@ -18,6 +18,7 @@ from procedures.shared import signals
 HELD = "LEVITATED"
 OFF = 0.05  # share by which the captured sine may differ from what was asked for
 SUM_OFF = 0.03  # by which a motor's current may differ from what its coils carry
+NOISE = 5.0  # standard uncertainties beside that
 UNEXPLAINED = 1e-4  # chance that a sound run's lines lie so far off their curve, all its curves together
 APART = 4.0  # standard uncertainties that constants of two places may lie apart
 
@@ -70,8 +71,8 @@ def _coils(taken: Sequence[Taken]) -> Iterator[Finding]:
     """A symmetric winding's current is sqrt(2/n) times the root of its coils' squares."""
     for t in taken:
         for name, coils in t.coils.items():
-            along, said = float(np.linalg.norm(coils)) * math.sqrt(2 / coils.size), t.said[name]
-            if abs(along / said - 1) > SUM_OFF:
+            along, (said, u) = float(np.linalg.norm(coils)) * math.sqrt(2 / coils.size), t.said[name]
+            if abs(along - said) > SUM_OFF * said + NOISE * u:
                 text = (f"the current of {name} is {said:.3g} A, its coils carry {along:.3g} A: another coil, or one that "
                         "is read wrongly.")  # fmt: skip
                 yield Finding("currents-disagree", text, t.where, Effect.ERROR)

@@ -106,14 +106,14 @@ def _read_ratio(added: Sequence[Added], driving: Sequence[str], slope: float, lo
 
 def _per_ampere(loop: str, place: str, lines: Sequence[Line], response: Response) -> Estimate:
     """M/K with noise, and with what a low-pass in the place of a delay makes of it."""
+    if not response.inertial > 0:
+        raise AnalysisError(f"{loop}, {place}: the current falls where the mass should be pushed: the sign of the current or "
+                            "of the position is exchanged")  # fmt: skip
     dof = float(np.mean([x.dof for x in lines]))
     noise = Influence(f"scatter/{loop}/{place}", "noise and counts of the readings", math.sqrt(response.covariance[0, 0]),
                       "A s^2/m", "A", "normal", dof, source="bins beside the lines; converter")  # fmt: skip
     bend = Influence(f"delay/{loop}/{place}", "low-pass or delay of the position", abs(response.inertial) * response.bend
                      / math.sqrt(3), "A s^2/m", "B", "rectangular", source="fit with either")  # fmt: skip
-    if not response.inertial > 0:
-        raise AnalysisError(f"{loop}, {place}: the current falls where the mass should be pushed: the sign of the current or "
-                            "of the position is exchanged")  # fmt: skip
     return Estimate.of(response.inertial, noise) + Estimate.of(0.0, bend)
 
 

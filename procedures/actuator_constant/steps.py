@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -37,8 +38,8 @@ class Common:
 class Taken:
     """A sine: at `hz` so many `periods` of `amplitude` m or rad; captured `position` (n,) and `currents` by motor (n,): empty
     where it was not captured; `coils` by motor, amplitude and sign of each of its coils' readings along the motor's own
-    current, A, and `said`, that current's amplitude: empty but for one sine of a place; `wave`, the captured sine's amplitude
-    as a share (NaN: not captured)."""
+    current, A, and `said`, that current's amplitude with its standard uncertainty: empty but for one sine of a place; `wave`,
+    the captured sine's amplitude as a share (NaN: not captured)."""
 
     common: Common
     hz: float
@@ -47,7 +48,7 @@ class Taken:
     position: Array
     currents: Mapping[str, Array]
     coils: Mapping[str, Array]
-    said: Mapping[str, float]
+    said: Mapping[str, tuple[float, float]]
     wave: float
 
     @property
@@ -104,9 +105,9 @@ def _taken(recording: Recording[Plan], step: Step) -> Taken:
     currents = {name: data[one.current][:n] for name, one in driving.items()}
     coils, said = {}, {}
     for name in driving if whole else ():
-        along, _ = without_trend(currents[name], periods)
+        along, left = without_trend(currents[name], periods)
         each = np.array([without_trend(data[c][:n], periods)[0] for c in rig.motors[name].currents])
-        said[name] = abs(along)
+        said[name] = abs(along), math.sqrt(2 / n * float(np.mean(left**2)))
         coils[name] = (each * np.conj(along)).real / max(abs(along), 1e-300)
     wave = abs(without_trend(data[can.wave][:n], periods)[0]) if can.wave else float("nan")
     return Taken(common, *facts, data[can.loops[common.loop].channel][:n], currents, coils, said, wave)
