@@ -7,9 +7,10 @@ around, their sum over the inertia that they turn, the ratio of two motors, and 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from itertools import count
 
-from bench.errors import AnalysisError
+from bench.errors import AnalysisError, BenchError
 from bench.figures import Figure
 from bench.findings import Effect, Finding, Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
@@ -115,15 +116,21 @@ def _sine(rig: Rig, plan: Plan, record: Recorder, loop: str, place: Place, hz: f
 
 def _added(rig: Rig, plan: Plan, record: Recorder, loop: str, place: Place) -> None:
     """To the first of two motors, either way in turn: what the other one then has less, the loop has taken back of both."""
-    parameter = next(iter(motors(rig.file, loop).values())).added
-    for repeat in range(plan.pairs):
-        for size in (plan.added_A, -plan.added_A):
-            rig.levitation.write({parameter: size})
-            rig.clock.sleep(plan.start_s + plan.added_settle * slow_s(rig.file, plan, loop))
-            with record.step(ADDED, loop=loop, place=place.name, size_A=size, repeat=repeat):
-                rig.clock.sleep(plan.rest_s)
-    rig.levitation.write({parameter: 0.0})
-    rig.clock.sleep(plan.start_s + plan.added_settle * slow_s(rig.file, plan, loop))
+    parameter, write = next(iter(motors(rig.file, loop).values())).added, rig.levitation.write
+    rest_s = plan.start_s + plan.added_settle * slow_s(rig.file, plan, loop)
+    try:
+        for repeat in range(plan.pairs):
+            for size in (plan.added_A, -plan.added_A):
+                write({parameter: size})
+                rig.clock.sleep(rest_s)
+                with record.step(ADDED, loop=loop, place=place.name, size_A=size, repeat=repeat):
+                    rig.clock.sleep(plan.rest_s)
+    except BaseException:
+        with suppress(BenchError):
+            write({parameter: 0.0})
+        raise
+    write({parameter: 0.0})
+    rig.clock.sleep(rest_s)
 
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> list[Result]:
