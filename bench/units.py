@@ -26,7 +26,7 @@ UNITS: dict[str, Unit] = {
     "mil": Unit("m", 25.4e-6),
     "s": Unit("s"), "ms": Unit("s", 1e-3), "us": Unit("s", 1e-6), "µs": Unit("s", 1e-6),
     "Hz": Unit("Hz"), "kHz": Unit("Hz", 1e3),
-    "1/s": Unit("1/s"), "1/s^2": Unit("1/s^2"), "1/s^3": Unit("1/s^3"),
+    "1/s": Unit("1/s"), "1/s^2": Unit("1/s^2"), "1/s^3": Unit("1/s^3"), "1/(A s^2)": Unit("1/(A s^2)"),
     "m/s": Unit("m/s"), "mm/s": Unit("m/s", 1e-3), "um/s": Unit("m/s", 1e-6), "µm/s": Unit("m/s", 1e-6),
     "kg": Unit("kg"), "g": Unit("kg", 1e-3), "mg": Unit("kg", 1e-6),
     "N": Unit("N"), "kN": Unit("N", 1e3), "mN": Unit("N", 1e-3),

@@ -233,6 +233,7 @@ class Motions:
         drag: what stops the shaft that coasts, by the names of a spindown: B and B_high N m s/rad, T_c N m, J_z kg m^2.
         mission: largest readings, levels, errors at rest and times of a mission, by quantity and place.
         currents: what stepped currents do, by quantity and place.
+        constants: of motors along and around, by quantity, where and place, of places by loop.
         speeds: at the torque limit, by sharing: `speed` rad/s, `bound` A of the torque current, `ripple` rad/s.
     """
 
@@ -252,6 +253,9 @@ class Motions:
     speeds: Callable[[RigFile, Any, SpeedsAsked], Mapping[str, Mapping[str, float]]] | None = None
     mission: Callable[[RigFile, Any, MissionAsked], Mapping[tuple[str, str], float]] | None = None
     currents: Callable[[RigFile, Any, CurrentAsked], Mapping[tuple[str, str], float]] | None = None
+    constants: (
+        Callable[[RigFile, Any, Mapping[str, Sequence[float]]], Mapping[tuple[str, str, float], float]] | None
+    ) = None
 
 
 NONE = Motions()

@@ -12,7 +12,7 @@ from typing import Any, Literal
 from pydantic import Field, model_validator
 
 from bench.rigfile.bit import Bit
-from bench.rigfile.capabilities_of_loops import CurrentStep, Hold, LoopInjection, Motion
+from bench.rigfile.capabilities_of_loops import CurrentStep, ForceCurrent, Hold, LoopInjection, Motion
 from bench.rigfile.elements import Name
 from bench.rigfile.part import Part
 from bench.rigfile.toleranced import Toleranced
@@ -134,6 +134,7 @@ class Capabilities(Part):
     """`bias` is by bearing; `settings` are by kind and name: the parameters that choose it; of kind "law" the first is what a
     lift and a stop go by, unless "lift" says more. `gains` are of the
     laws that are no `flatness`, which is by the name of a law. `model` is what the controller knows of the machine, by meaning.
+    `force_currents` are by the motor's name.
     `loop_delay` is from the instant of a reading until the current that answers it has gone 63 % of its way (1 - 1/e): what
     the controller computes, one tick at least, and the amplifier's time constant. `loop_delay_s` is the same in short."""
 
@@ -151,6 +152,7 @@ class Capabilities(Part):
     flatness: Mapping[Name, Flatness] = {}
     status: Status = Status()
     current_steps: Mapping[Name, CurrentStep] = {}
+    force_currents: Mapping[Name, ForceCurrent] = {}
     model: Mapping[Name, str] = {}
     landing_speed: str = ""
     lift_time: str = ""
@@ -212,6 +214,7 @@ def _tables(c: Capabilities) -> Iterator[tuple[str, str | Mapping[str, str]]]:
         yield from ((f"flatness.{law}.{key}", value) for key, value in flat)
     for place, step in c.current_steps.items():
         yield f"current_steps.{place}", {k: v for k in STEP_PARAMETERS if (v := getattr(step, k))}
+    yield "force_currents", {name: one.added for name, one in c.force_currents.items() if one.added}
     yield "model", c.model
     for key in ("landing_speed", "lift_time", "watchdog", "current_limit"):
         yield key, getattr(c, key)

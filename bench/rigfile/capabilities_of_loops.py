@@ -131,3 +131,16 @@ class CurrentStep(Part):
     def stated(self) -> tuple[str, ...]:
         """Numbers of `[machine]` that it names."""
         return tuple(name for name in (self.inductance, self.filter_inductance) if name)
+
+
+class ForceCurrent(Part):
+    """The current by which a motor gives force along a loop of `loop_injection`, or torque around: `current` is the channel
+    that reads it, of telemetry and of captures alike; `added`, A, the parameter that is added to its reference. `period` is the
+    place in this file of a number that says how the current's phase goes with the loop's coordinate: a length has a turn of it,
+    a count so many turns of it a turn. `zero`: the encoder's zero against that phase, electrical, as it was set."""
+
+    loop: str
+    current: str
+    added: str = ""
+    period: str = ""
+    zero: Toleranced

@@ -54,6 +54,7 @@ def problems_of(rig: RigFile) -> Iterator[Problem]:
         yield Problem(rig.path, f"geometry.{key}", "nothing", f"{needed[key]}, with its certificate")
     stepped = rig.capabilities.current_steps.values()
     used = references_in(rig) | {f"machine/{name}" for step in stepped for name in step.stated}
+    used |= {one.period for one in rig.capabilities.force_currents.values()}
     for key in sorted(rig.machine.keys() - MACHINE.keys()):
         if f"machine/{key}" not in used:
             yield Problem(rig.path, f"machine.{key}", "a number nobody asks for", f"one of {', '.join(MACHINE)}")

@@ -18,6 +18,7 @@ from procedures.loop_response.fit import Point
 from procedures.loop_response.injection import REFERENCE, SENSOR, ability, chosen, integrator_s, sensitive, settle_s
 from procedures.loop_response.plan import Plan
 from procedures.loop_response.steps import REFINED, Taken, of_loop
+from procedures.position_loops.lines import counted
 
 Array = npt.NDArray[np.float64]
 
@@ -124,15 +125,8 @@ def _tau(rig: RigFile, plan: Plan, axis: str) -> float:
 
 
 def rounding(t: Taken, rig: RigFile) -> float:
-    """Standard uncertainty of |y| by the counts of the reading, as a share of what was injected.
-
-    A rounding of step q after noise s adds at most (2 q/pi) exp(-2 pi^2 s^2/q^2) |J1(2 pi Y/q)| to a sine of amplitude Y
-    (Widrow and Kollar, Quantization Noise, 2008: the first term of the rounding's series); |J1(x)| < sqrt(2/(pi x)). Its
-    sign goes with Y and with where the loop stands between two counts: another for each line, an arcsine.
-    """
+    """Standard uncertainty of |y| by the counts of the reading, as a share of what was injected."""
     assert rig.capture is not None
     assert t.line is not None
-    q = rig.capture.channels[ability(rig).loops[t.axis].channel].scale
-    noise = max(t.line.rms**2 - q * q / 12, 0.0)  # without what rounding itself adds
-    bessel = min(0.582, math.sqrt(q / (math.pi**2 * max(t.line.swing, 1e-300))))
-    return 2 * q / math.pi * math.exp(-2 * noise * (math.pi / q) ** 2) * bessel / math.sqrt(2) / t.amplitude
+    scale = rig.capture.channels[ability(rig).loops[t.axis].channel].scale
+    return counted(scale, t.line.rms, t.line.swing) / t.amplitude

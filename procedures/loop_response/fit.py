@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.errors import AnalysisError
+from procedures.position_loops.lines import without_trend
 from procedures.shared.leastsquares import Fit, linear
 
 Array = npt.NDArray[np.float64]
@@ -48,13 +49,13 @@ def line(y: npt.ArrayLike, periods: int, amplitude: float, wave: npt.ArrayLike |
     n = values.size
     if periods < 4 or n < 4 * periods:
         raise AnalysisError(f"line: found {periods} periods in {n} samples; expected 4 or more, of 4 samples at least")
-    found, left = _without_trend(values, periods)
+    found, left = without_trend(values, periods)
     bins = np.arange(max(2, periods - BESIDE), min(periods + BESIDE + 1, n // 2))
     bins = bins[bins % periods != 0]
     noise = float(np.mean(np.abs(np.fft.rfft(left)[bins] * 2 / n) ** 2)) / 2
     of_wave = math.nan
     if wave is not None:
-        phasor, _ = _without_trend(np.asarray(wave, np.float64), periods)
+        phasor, _ = without_trend(np.asarray(wave, np.float64), periods)
         of_wave = abs(phasor)
         found = found / (phasor / of_wave) if of_wave else found
     if sensed and wave is None:
@@ -62,16 +63,6 @@ def line(y: npt.ArrayLike, periods: int, amplitude: float, wave: npt.ArrayLike |
     size = abs(1 + found / amplitude) if sensed else abs(found) / amplitude
     rms = math.sqrt(float(np.mean(left**2)))
     return Line(size, math.sqrt(noise) / amplitude, 2.0 * bins.size, of_wave, abs(found), rms)
-
-
-def _without_trend(values: Array, periods: int) -> tuple[complex, Array]:
-    """The phasor of so many periods beside a straight line, and what is left of both (n,). Taken off before, a line would take
-    a share of up to 6/(pi p)^2 of the sine with it."""
-    turn = 2 * np.pi * periods * np.arange(values.size) / values.size
-    fit = linear(
-        np.column_stack([np.cos(turn), np.sin(turn), np.ones_like(turn), np.linspace(-1, 1, values.size)]), values
-    )
-    return complex(fit.terms[0], -fit.terms[1]), fit.residuals
 
 
 @dataclass(frozen=True)

@@ -1,49 +1,26 @@
-"""Sines into a position loop: how large, how long, at which frequencies; and the writes that make one."""
+"""Sines into a position loop by the plan: how large, how long, at which frequencies."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 
-from bench.errors import BenchError, Lacking
-from bench.procedure.rig import Rig
 from bench.rigfile import RigFile
-from bench.rigfile.capabilities_of_loops import InjectedLoop, LoopInjection
+from bench.rigfile.capabilities_of_loops import InjectedLoop
 from procedures.loop_response.plan import Plan
+from procedures.position_loops import injection as shared
+from procedures.position_loops.injection import BELOW as BELOW
+from procedures.position_loops.injection import REFERENCE as REFERENCE
+from procedures.position_loops.injection import SENSOR as SENSOR
+from procedures.position_loops.injection import USUAL_HZ, Sine
+from procedures.position_loops.injection import ability as ability
+from procedures.position_loops.injection import injected as injected
+from procedures.position_loops.injection import parameters_of as parameters_of
 from procedures.shared.rates import rate_of
 
-USUAL_HZ = 35e3
-SENSOR, REFERENCE = "sensor", "reference"
 RAISED, DAMPED = (
     6.0,
     3.0,
 )  # by which a loop may raise what is added to its reading, where its stiffness and its damping count
-BELOW = 0.3  # of the rate of captures, that a line may have
-UNKNOWN_S = 0.1  # of an integrator that the rig file does not tell
-
-
-@dataclass(frozen=True)
-class Sine:
-    """So many whole `periods` in so many `samples`; `amplitude` 0-pk, m or rad."""
-
-    hz: float
-    amplitude: float
-    periods: int
-    samples: int
-
-
-def ability(rig: RigFile) -> LoopInjection:
-    """What the controller injects.
-
-    Raises:
-        Lacking: it does not.
-    """
-    can = rig.capabilities.loop_injection
-    if can is None:
-        raise Lacking("capabilities.loop_injection: found none")
-    return can
 
 
 def chosen(rig: RigFile, plan: Plan) -> tuple[str, ...]:
@@ -67,15 +44,12 @@ def rate(rig: RigFile, plan: Plan) -> float:
 
 def told(rig: RigFile, plan: Plan, parameter: str) -> float | None:
     """A parameter of the controller under the plan; None where the rig file does not tell which."""
-    if parameter not in rig.parameters:
-        return None
-    return plan.parameters.get(parameter, rig.parameters[parameter].default)
+    return shared.told(rig, plan.parameters, parameter)
 
 
 def integrator_s(rig: RigFile, plan: Plan, loop: InjectedLoop) -> float:
     """How slow the integrator of a loop is: k_P/k_I, s."""
-    kp, ki = told(rig, plan, loop.kp), told(rig, plan, loop.ki)
-    return kp / ki if kp and ki else 0.0 if kp else UNKNOWN_S
+    return shared.integrator_s(rig, plan.parameters, loop)
 
 
 def settle_s(rig: RigFile, plan: Plan, axis: str) -> float:
@@ -103,29 +77,5 @@ def amplitude(rig: RigFile, plan: Plan, axis: str, place: str, hz: float) -> flo
 
 def sine(rig: RigFile, plan: Plan, axis: str, place: str, hz: float, least_s: float) -> Sine:
     """A line near `hz` that has whole periods in whole samples."""
-    sampled = rate(rig, plan)
-    periods = max(plan.periods, math.ceil(least_s * hz))
-    samples = round(periods * sampled / hz)
-    exact = periods * sampled / samples
+    exact, periods, samples = shared.whole(rate(rig, plan), hz, least_s, plan.periods)
     return Sine(exact, amplitude(rig, plan, axis, place, exact), periods, samples)
-
-
-def parameters_of(can: LoopInjection, place: str, one: Sine) -> dict[str, float]:
-    """The controller's parameters that make it, but the one that begins."""
-    return {can.place: can.places[place], can.amplitude: one.amplitude, can.hz: one.hz}  # type: ignore[index]
-
-
-@contextmanager
-def injected(rig: Rig, axis: str, place: str, one: Sine, start_s: float) -> Iterator[None]:
-    """With a sine in a loop, settled; off again in the end, whatever happens."""
-    can, write = ability(rig.file), rig.levitation.write
-    write(parameters_of(can, place, one))
-    try:
-        write({can.axis: can.loops[axis].value})
-        rig.clock.sleep(start_s)
-        yield
-    except BaseException:
-        with suppress(BenchError):
-            write({can.axis: can.off})
-        raise
-    write({can.axis: can.off})

@@ -153,3 +153,11 @@ UNSTABLE_POLE = (
     "stiffer at 20 µm than at the middle changes the pole by about 0.3 %.",
     "Another place along the shaft: the pole is that of planes which pull as they do where it was measured.",
 )
+ACTUATOR_CONSTANT = (
+    "What is moved is the mass, and what is turned the inertia, of the rig file: an error of either changes its constants by "
+    "its share, and K_over_J and the ratio not at all. Only a known ring on the shaft would show it.",
+    "An encoder's zero that is off by more than its tolerance takes its cosine: 10° electrical read 1.5 % less, in either "
+    "sign. Set the zero first.",
+    "Time is the controller's: a clock that is fast by 1e-4 changes constants by 2e-4.",
+    "A scale of the position beyond its certificate changes the constants along by its share.",
+)

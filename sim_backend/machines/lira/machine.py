@@ -16,6 +16,7 @@ from sim_backend.machines.lira.operator import Attendant
 from sim_backend.machines.lira.params import COILS, ControlParams, Each, PlantParams
 from sim_backend.machines.lira.plant import DQ, TICKS_S, Plant
 from sim_backend.machines.lira.settings import BY_NAME, HELD, INJECTED, LONGEST_HOLD_S
+from sim_backend.machines.lira.truth_constants import constants
 from sim_backend.machines.lira.truth_current_step import currents
 from sim_backend.machines.lira.truth_loops import loops
 from sim_backend.machines.lira.truth_mission import mission
@@ -280,7 +281,7 @@ LIRA = Machine(
     controls=frozenset((*BY_NAME, *INJECTED, *HELD)) | SENT | {f"step_{name}" for name in DQ},
     tick_s=1 / TICKS_S,
     period_s=PERIOD_S,
-    motions=Motions(mission=mission, currents=currents, loops=loops),
+    motions=Motions(mission=mission, currents=currents, loops=loops, constants=constants),
     controller=SpokenController,
     served=LineController,
 )

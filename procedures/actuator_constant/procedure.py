@@ -1,0 +1,257 @@
+"""Constants of a mover's motors from its answer to their currents: force along, torque around, each per ampere.
+
+Measurands, constants per true ampere of the current that gives the force: K_force of a motor along, K_torque of each motor
+around, their sum over the inertia that they turn, the ratio of two motors, and the slope of cogging at each place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
+from itertools import count
+
+from bench.errors import AnalysisError, BenchError
+from bench.figures import Figure
+from bench.findings import Effect, Finding, Findings
+from bench.procedure import Measured, Procedure, Quantity, read_method
+from bench.procedure.requires import Requires
+from bench.procedure.rig import Rig
+from bench.procedure.roles import RigState
+from bench.recording import Recording
+from bench.recording.recorder import Recorder
+from bench.rigfile import RigFile
+from bench.rigfile.envelope import Envelope
+from procedures.actuator_constant import checks, estimates
+from procedures.actuator_constant import figures as drawn
+from procedures.actuator_constant.estimates import Result
+from procedures.actuator_constant.plan import Plan
+from procedures.actuator_constant.sines import (
+    Place,
+    around,
+    frequencies,
+    loops,
+    motors,
+    places,
+    rate,
+    sine,
+    slow_s,
+    start_s,
+)
+from procedures.actuator_constant.steps import ADDED, SINE, STATE, channels, read_added, read_taken
+from procedures.position_loops.injection import BELOW, REFERENCE, ability, injected, parameters_of
+from procedures.shared import assumptions
+from procedures.shared.rates import of_rate
+
+K_FORCE = Quantity("K_force", "N/A", "force of a motor along per ampere that gives it", title="force constant")
+K_TORQUE = Quantity("K_torque", "N m/A", "torque of a motor per ampere that gives it", title="torque constant")
+K_OVER_J = Quantity("K_over_J", "1/(A s^2)", "torque constants of all motors around, together, over the inertia they turn",
+                    title="torque constants over inertia")  # fmt: skip
+RATIO = Quantity("K_ratio", "1", "constant of one motor over that of the other, both around one axis or along it",
+                 title="ratio of the constants")  # fmt: skip
+SLOPE = Quantity("cogging_stiffness", "N/m", "slope of what pulls back along, at a place", title="cogging stiffness")
+SLOPE_ANGLE = Quantity("cogging_stiffness_angle", "N m/rad", "slope of what turns back, at an angle",
+                       title="cogging stiffness around")  # fmt: skip
+MEASURES = (K_FORCE, K_TORQUE, K_OVER_J, RATIO, SLOPE, SLOPE_ANGLE)
+MARGIN_S = 1e-3  # of a capture
+OBSERVER = "observer"
+
+
+def step_count(plan: Plan) -> int:
+    """Of two loops, one of which has two motors, for the progress display."""
+    added = 2 * plan.pairs if plan.added_A else 0
+    return (len(plan.places_m) + len(plan.angles_rad)) * plan.lines + added
+
+
+def steps_on(rig: RigFile, plan: Plan) -> int:
+    """How many it records on a rig."""
+    return sum(
+        len(places(rig, plan, loop)) * plan.lines + 2 * plan.pairs * adds(rig, plan, loop) for loop in loops(rig, plan)
+    )
+
+
+def adds(rig: RigFile, plan: Plan, loop: str) -> bool:
+    """Whether a current is added to one of two motors."""
+    driving = list(motors(rig, loop).values())
+    return plan.added_A > 0 and len(driving) == 2 and bool(driving[0].added)
+
+
+def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
+    """The observer; nothing is injected, nothing is added."""
+    can = ability(rig)
+    added = {one.added: 0.0 for one in rig.capabilities.force_currents.values() if one.added}
+    return {can.axis: can.off, **added, **rig.capabilities.settings.get(OBSERVER, {}).get(plan.observer, {})}
+
+
+def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
+    """Of each loop: go to each place, inject sines; at the first add a current to one of two motors."""
+    for name, value in plan.parameters.items():
+        rig.levitation.write({name: value})
+    numbers = count(1)
+    for loop in loops(rig.file, plan):
+        for k, place in enumerate(places(rig.file, plan, loop)):
+            rig.levitation.write({place.parameter: place.value})
+            rig.clock.sleep(plan.settle_s + plan.time_constants * slow_s(rig.file, plan, loop))
+            lines = frequencies(rig.file, plan, loop)
+            for j, hz in enumerate(lines):
+                _sine(rig, plan, record, loop, place, hz, j == len(lines) // 2, next(numbers))
+            if k == 0 and adds(rig.file, plan, loop):
+                _added(rig, plan, record, loop, place)
+
+
+def _sine(rig: Rig, plan: Plan, record: Recorder, loop: str, place: Place, hz: float, whole: bool, number: int) -> None:
+    """Inject, capture, upload."""
+    one = sine(rig.file, plan, loop, hz)
+    labels: dict[str, float | str] = {
+        "loop": loop, "place": place.name, "hz": one.hz, "amplitude": one.amplitude, "periods": one.periods,
+        "samples": one.samples, "whole": int(whole), "number": number,
+    }  # fmt: skip
+    assert rig.capture is not None
+    with injected(rig, loop, REFERENCE, one, start_s(rig.file, plan, loop)):
+        with record.step(SINE, **labels):
+            seconds = one.samples / rate(rig.file, plan) + MARGIN_S
+            rig.capture.arm(list(channels(rig.file, loop, whole)), seconds=seconds, rate_hz=rate(rig.file, plan))
+            rig.capture.wait(seconds + 5.0)
+    rig.capture.upload(None, **labels)
+
+
+def _added(rig: Rig, plan: Plan, record: Recorder, loop: str, place: Place) -> None:
+    """To the first of two motors, either way in turn: what the other one then has less, the loop has taken back of both."""
+    parameter, write = next(iter(motors(rig.file, loop).values())).added, rig.levitation.write
+    rest_s = plan.start_s + plan.added_settle * slow_s(rig.file, plan, loop)
+    try:
+        for repeat in range(plan.pairs):
+            for size in (plan.added_A, -plan.added_A):
+                write({parameter: size})
+                rig.clock.sleep(rest_s)
+                with record.step(ADDED, loop=loop, place=place.name, size_A=size, repeat=repeat):
+                    rig.clock.sleep(plan.rest_s)
+    except BaseException:
+        with suppress(BenchError):
+            write({parameter: 0.0})
+        raise
+    write({parameter: 0.0})
+    rig.clock.sleep(rest_s)
+
+
+def evaluate(recording: Recording[Plan], findings: Findings) -> list[Result]:
+    """Constants of each loop's motors."""
+    rig, plan = recording.rig, recording.plan
+    taken, added = read_taken(recording), read_added(recording)
+    findings.gate(checks.of_signals(taken, added, rig, plan))
+    try:
+        results = estimates.results(taken, added, rig, plan)
+    except AnalysisError as error:
+        findings.end(Finding("no-mass", f"{error}.", "", Effect.ERROR))
+    findings.add(checks.of_results(results, rig, plan))
+    return results
+
+
+def measured(results: Sequence[Result]) -> Iterator[Measured]:
+    """The quantities of each loop."""
+    for quantity in MEASURES:
+        for result in results:
+            for (name, where), estimate in result.estimates.items():
+                if name == quantity.name:
+                    yield quantity.measured(estimate, where)
+
+
+def check(rig: RigFile, plan: Plan) -> Iterable[str]:
+    """What cannot work before anything starts."""
+    can, known = ability(rig), tuple(dict.fromkeys(one.loop for one in rig.capabilities.force_currents.values()))
+    for key, names in (("loops", plan.loops), ("amplitude", plan.amplitude)):
+        if unknown := [name for name in names if name not in known]:
+            yield f"{key}: found {', '.join(unknown)}; motors are known along {', '.join(known)}"
+            return
+    observers = rig.capabilities.settings.get(OBSERVER, {})
+    if observers and plan.observer not in observers:
+        yield f"observer: found {plan.observer!r}; expected one of {', '.join(observers)}"
+    if unknown := [name for name in plan.parameters if name not in rig.parameters]:
+        yield f"parameters: found {', '.join(unknown)}; expected parameters of this rig"
+        return
+    if plan.high_hz > BELOW * rate(rig, plan) or plan.high_hz < 2 * plan.low_hz:
+        yield f"high_hz: found {plan.high_hz:g}; expected {2 * plan.low_hz:g} to {BELOW * rate(rig, plan):g}"
+    yield from of_rate(rig, plan.rate_hz)
+    envelope = Envelope(rig)
+    for loop in loops(rig, plan):
+        one = sine(rig, plan, loop, plan.high_hz)
+        yield from (
+            f"{loop}: {problem}"
+            for problem in envelope.problems_of(plan.parameters | parameters_of(can, REFERENCE, one))
+        )
+        for place in places(rig, plan, loop):
+            yield from (
+                f"{loop}, {place.name}: {problem}" for problem in envelope.problems_of({place.parameter: place.value})
+            )
+        if adds(rig, plan, loop):
+            parameter = next(iter(motors(rig, loop).values())).added
+            yield from (f"added_A: {problem}" for problem in envelope.problems_of({parameter: plan.added_A}))
+
+
+def figures(results: Sequence[Result], recording: Recording[Plan]) -> Iterable[Figure]:
+    """The apparent constant of each line with the fit."""
+    del recording
+    return drawn.all_figures(results)
+
+
+def requires(rig: RigFile) -> Requires:
+    """By the names that the rig has."""
+    can, driving = rig.capabilities.loop_injection, rig.capabilities.force_currents
+    wanted = ("loop_injection", "force_currents", "motion")
+    if can is None or not driving or rig.capabilities.motion is None:
+        return Requires(capabilities=wanted, capture=())
+    shown = tuple(dict.fromkeys(can.loops[one.loop].channel for one in driving.values()))
+    currents = tuple(one.current for one in driving.values())
+    coils = tuple(c for name in driving for c in rig.motors[name].currents)
+    return Requires(
+        channels=(*shown, *currents, STATE),
+        sensors=coils,
+        capabilities=wanted,
+        capture=(*shown, *currents, *coils, *([can.wave] if can.wave else [])),
+        lacks=tuple(_lacks(rig)),
+    )
+
+
+def _lacks(rig: RigFile) -> Iterator[str]:
+    can = ability(rig)
+    if REFERENCE not in can.places:
+        yield "capabilities.loop_injection.places: found no reference"
+    for loop in dict.fromkeys(one.loop for one in rig.capabilities.force_currents.values()):
+        if not can.loops[loop].inertia:
+            yield f"capabilities.loop_injection.loops.{loop}: found no inertia"
+        if len(motors(rig, loop)) > 2:
+            yield f"capabilities.force_currents: found {len(motors(rig, loop))} motors along {loop}; expected one or two"
+        if not places(rig, Plan.model_validate({}), loop):
+            yield f"capabilities.motion: {loop} is moved by none of its set points"
+
+
+def untold(rig: RigFile) -> tuple[Quantity, ...]:
+    """What the rig's motors cannot show."""
+    every = dict.fromkeys(one.loop for one in rig.capabilities.force_currents.values())
+    turns = [loop for loop in every if around(rig, loop)]
+    two = any(adds(rig, Plan.model_validate({}), loop) for loop in every)
+    along = () if len(turns) < len(every) else (K_FORCE, SLOPE)
+    return (*along, *(() if turns else (K_TORQUE, K_OVER_J, SLOPE_ANGLE)), *(() if two else (RATIO,)))
+
+
+procedure = Procedure(
+    name="actuator-constant",
+    title="Force and torque constants of a mover's motors",
+    measures=MEASURES,
+    state=RigState.LEVITATED,
+    plan=Plan,
+    acquire=acquire,
+    evaluate=evaluate,
+    measured=measured,
+    figures=figures,
+    requires=requires,
+    check=check,
+    settings=settings,
+    step_count=step_count,
+    steps_on=steps_on,
+    fewest_steps=lambda plan: 1,
+    untold=untold,
+    optional=MEASURES,  # of none but the loops that are chosen
+    left_out=lambda plan: () if plan.added_A else (RATIO,),
+    assumes=assumptions.ACTUATOR_CONSTANT,
+    method=read_method(__file__),
+)
