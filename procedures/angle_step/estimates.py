@@ -29,8 +29,8 @@ class Result:
     short: int = 0
 
 
-def by_case(moves: list[Done], rig: RigFile, band: float, count_rad: float) -> dict[Case, Result]:
-    """Every case's result; `band` is a share of the step, `count_rad` one encoder count.
+def by_case(moves: list[Done], rig: RigFile, band: float, count_rad: float, kp: float) -> dict[Case, Result]:
+    """Every case's result; `band` is a share of the step, `count_rad` one encoder count, `kp` A/rad of the angle's loop.
 
     Raises:
         AnalysisError: a move does not reach its step.
@@ -41,7 +41,7 @@ def by_case(moves: list[Done], rig: RigFile, band: float, count_rad: float) -> d
     period = _period(moves)
     bands = {case: max(band * case.size, 2 * count_rad) for case in steps.by_case(moves)}
     responses = {c: tuple(response(d.move, bands[c]) for d in done) for c, done in steps.by_case(moves).items()}
-    finer, short = captured.by_case(moves, responses, rig, bands, count_rad)
+    finer, short = captured.by_case(moves, responses, rig, bands, count_rad, kp)
     return {
         case: Result(
             case, r, _estimates(case, r, gains, share, count_rad, period) | finer.get(case, {}), short.get(case, 0)
