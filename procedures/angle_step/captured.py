@@ -22,6 +22,7 @@ from procedures.angle_step.budget import OUTBOARD, at_motor, gained, within
 from procedures.angle_step.fine import Fine, fine
 from procedures.angle_step.paths import Peak, peak_of
 from procedures.angle_step.response import Response
+from procedures.angle_step.settling import WAYS, settled
 from procedures.angle_step.standing import EACH, stands
 from procedures.angle_step.steps import Case, Done
 from procedures.angle_step.trend import noise
@@ -29,7 +30,6 @@ from procedures.servomotor.conventions import conventions
 from procedures.shared.certificates import certified_gain
 
 Array = npt.NDArray[np.float64]
-WAYS = (True, False)  # to the angle, and back
 TICKS = 0.1  # of a tick: a crossing, where steps that are alike meet the same ticks
 BETWEEN = 0.009  # of a count: what a turning point is off in all steps of one way (simulated swings)
 
@@ -64,7 +64,8 @@ def _estimates(
 ) -> dict[str, Estimate]:  # fmt: skip
     where, swings = case.where, [d.swing for d in done if d.swing is not None]
     tick = float(swings[0].t[1])
-    between = _read(f"edges/{where}", "encoder between its counts", BETWEEN * count, "rad")
+    between = _read(f"edges/{where}", "encoder between its counts",
+                    max(f.course.unsure(BETWEEN, count) for f in found), "rad")  # fmt: skip
     crossings = _read(f"ticks/{where}", "sampling", tick * TICKS, "s")
     tops = _ways(found, [f.overshoot for f in found])
     starts = _ways(found, [f.began.edge for f in found])
@@ -107,18 +108,9 @@ def _in(estimate: Estimate, unit: str) -> Estimate:
 
 
 def _settling(where: str, found: Sequence[Fine], top: tuple[float, int], count: float) -> Estimate:
-    """The mean over the steps, and over what their angles may be off; `top`: what noise does to a turning point as it is read,
-    rad, and the degrees of freedom by which it may be more. A start that is a count further makes all swings smaller as it
-    does the step, one at the band by that share of the band. A swing that ends near it leaves it in one step and not in the
-    next: what is told is how often, which jumps nowhere."""
-    noisy = max(top[0], EACH * count)
-    off = [math.hypot(noisy, f.band * count / f.size / math.sqrt(12) if f.began.loose else 0.0) for f in found]
-    each = np.array([f.settlings(by, top[1]) for f, by in zip(found, off, strict=True)])
-    alike = np.array([f.settlings(BETWEEN * count) for f in found])
-    chance = Influence(id=f"scatter/settling_time/{where}", name="whether a swing leaves the band", unit="s", kind="B",
-                       u=math.sqrt(float(each.var(axis=1).sum())) / len(found), distribution="normal")  # fmt: skip
-    read = _read(f"edges/settling/{where}", "encoder between its counts", float(alike.mean(axis=0).std()), "s")
-    return Estimate.of(float(each.mean()), chance) + read
+    """The mean over the steps; `top`: what noise does to a turning point as it is read, rad, and the degrees of freedom by
+    which it may be more."""
+    return settled(where, [f.settled for f in found], (max(top[0], EACH * count), top[1]), BETWEEN, count)
 
 
 def _final(where: str, found: Sequence[Fine], done: Sequence[Done], count: float, kp: float) -> Estimate:

@@ -56,6 +56,11 @@ class Course:
         part = (level - self.y[k - 1]) / (self.y[k] - self.y[k - 1])
         return float(self.t[k - 1] + part * (self.t[k] - self.t[k - 1]))
 
+    def unsure(self, between: float, count: float) -> float:
+        """What a turning point is off, rad, where `between` counts are what edges enough leave open. A line from edge to edge
+        is up to a count short of it."""
+        return between * count if np.isfinite(self.gain) else count / np.sqrt(3)
+
     def last_outside(self, target: float, band: float) -> float:
         """When the angle is last outside a band about a target, s; 0 where it never is."""
         size = np.abs(self.y - target)
@@ -69,9 +74,10 @@ class Course:
         return float(self.t[k] + part * (self.t[k + 1] - self.t[k]))
 
 
-def course(found: Edges, t: Array, told: Array, torque: Array, begins: int) -> Course:
+def course(found: Edges, t: Array, told: Array, torque: Array, begins: int, stiff: float = STIFF) -> Course:
     """Of edges (in the step's direction, from where it began), and at times (n,) s in that direction too: the angle that is
-    `told`, rad, of which it is off half a count at most, and the torque current, A, which answers at tick `begins`."""
+    `told`, rad, of which it is off half a count at most, and the torque current, A, which answers at tick `begins`.
+    `stiff`: the share of the edges' spread that their times give."""
     straight = np.interp(t, found.t, found.y) if len(found.t) else np.zeros_like(t)
     least, most = told - found.count / 2, told + found.count / 2
     part = _swinging(found, float(t[begins]))
@@ -88,15 +94,15 @@ def course(found: Edges, t: Array, told: Array, torque: Array, begins: int) -> C
         speed = np.interp(at, t, np.gradient(model, t))
         blur = np.hypot(speed * (t[1] - t[0]) / np.sqrt(12), BLUR * found.count)
     within = (t >= at[0]) & (t <= at[-1])
-    angle = np.where(within, model + _stiff(at, y - here @ numbers, blur, t), straight)
+    angle = np.where(within, model + _stiff(at, y - here @ numbers, blur, t, stiff), straight)
     return Course(t, np.clip(angle, least, most), float(numbers[3]))
 
 
-def _stiff(at: Array, left: Array, blur: Array, t: Array) -> Array:
+def _stiff(at: Array, left: Array, blur: Array, t: Array, stiff: float) -> Array:
     """The stiffest spline that goes by what is left at the edges within their blur, at times `t`."""
     from scipy import interpolate
 
-    spline = interpolate.UnivariateSpline(at, left, w=1 / blur, k=3, s=STIFF * len(at))
+    spline = interpolate.UnivariateSpline(at, left, w=1 / blur, k=3, s=stiff * len(at))
     out: Array = spline(np.clip(t, at[0], at[-1]))
     return out
 

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from procedures.angle_step.bounds import Swing
 from procedures.angle_step.course import Course, course
 from procedures.angle_step.edges import edges
+from procedures.angle_step.settling import Settling
 from procedures.angle_step.standing import Began, began
 from procedures.angle_step.steps import Done
 
@@ -19,7 +20,6 @@ Array = npt.NDArray[np.float64]
 ANSWERS = 0.5  # of its greatest: the torque current that answers a step
 SWING_S = 5e-3  # a swing that ends near the band leaves it or does not: a jump of more
 NEAR = 0.1  # of the rise: about a crossing, for the speed there
-QUANTILES = 41  # by which an angle that is unsure may be off
 
 
 @dataclass(frozen=True)
@@ -49,15 +49,11 @@ class Fine:
         slow, fast = (float(np.interp(at + near, t, y) - np.interp(at - near, t, y)) / (2 * near) for at in (low, high))
         return 0.9 / slow - 0.1 / fast
 
-    def settlings(self, unsure: float, dof: float = 1e6) -> Array:
-        """The settling time, s, by angles that are off by so much, rad, times the quantiles of t: where a swing ends within
-        that of the band, some have it and some do not."""
-        from scipy import special
-
-        off = unsure * special.stdtrit(dof, (np.arange(QUANTILES) + 0.5) / QUANTILES)
-        return np.array([self.course.last_outside(self.size, self.band - by) for by in off]) - float(
-            self.course.t[self.answers]
-        )
+    @property
+    def settled(self) -> Settling:
+        """By which its settling time is told."""
+        answers = float(self.course.t[self.answers])
+        return Settling(self.forward, self.course, self.size, self.band, answers, self.began.loose)
 
 
 def fine(done: Done, swing: Swing, settling: float, band: float, count: float) -> Fine | None:
