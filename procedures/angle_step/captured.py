@@ -1,8 +1,10 @@
 """From captured steps to estimates: what the steps that were made did, by what their captures can tell.
 
-The response of the angle is that of the steps that were made, as a mean of both ways: where each begins within its encoder's
-count, and how far the angle's integrator has learned by then, makes steps differ, and is no error of what was read. What was
-read is as good as edges and ticks. The shaft's path has noise, and its uncertainty what the steps of one way differ by.
+The response of the angle is a mean over both ways. Where a step begins within its encoder's count, and how far the angle's
+integrator has learned by then, goes on from step to step in the same way each time, and is no error. How far steps are off that
+trend is: it is noise, of the reading as of the machine, and near the end of its levitation, with amplifiers that cut, most of
+what is not known. What is off in all steps alike has a term of its own. The shaft's path has noise, and its uncertainty what
+the steps of one way differ by.
 """
 
 from __future__ import annotations
@@ -17,16 +19,19 @@ from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
 from procedures.angle_step import bounds, steps
 from procedures.angle_step.budget import OUTBOARD, at_motor, gained, within
-from procedures.angle_step.fine import BETWEEN, FURTHER, Fine, fine
+from procedures.angle_step.fine import Fine, fine
 from procedures.angle_step.paths import Peak, peak_of
 from procedures.angle_step.response import Response
+from procedures.angle_step.settling import WAYS, settled
+from procedures.angle_step.standing import EACH, stands
 from procedures.angle_step.steps import Case, Done
+from procedures.angle_step.trend import noise
 from procedures.servomotor.conventions import conventions
 from procedures.shared.certificates import certified_gain
 
 Array = npt.NDArray[np.float64]
-WAYS = (True, False)  # to the angle, and back
-CROSSING = math.sqrt(2 / 3 / 12)  # of a tick: a time between two edges has 2/3 of the variance of one within a tick
+TICKS = 0.1  # of a tick: a crossing, where steps that are alike meet the same ticks
+BETWEEN = 0.009  # of a count: what a turning point is off in all steps of one way (simulated swings)
 
 
 def by_case(
@@ -35,45 +40,49 @@ def by_case(
     rig: RigFile,
     bands: Mapping[Case, float],
     count: float,
+    kp: float,
 ) -> tuple[dict[Case, dict[str, Estimate]], dict[Case, int]]:
     """What captures add and what they say better, of the cases whose captures hold their steps; and how many are too short of
-    each other. `bands` rad of settling, `count` rad of the encoder."""
+    each other. `bands` rad of settling, `count` rad of the encoder, `kp` A/rad."""
     whole: dict[Case, list[Fine]] = {}
     short: dict[Case, int] = {}
     done = {case: [d for d in of if d.swing is not None] for case, of in steps.by_case(list(moves)).items()}
     for case, of in done.items():
+        if min(sum((d.move.step > 0) is way for d in of) for way in WAYS) < 2:
+            continue  # the run ended within this case
         found = [fine(d, d.swing, r.settling, bands[case], count)
                  for d, r in zip(of, responses[case], strict=False) if d.swing is not None]  # fmt: skip
         if any(f is None for f in found):
             short[case] = sum(f is None for f in found)
         elif found:
             whole[case] = [f for f in found if f is not None]
-    return {c: _estimates(c, found, done[c], responses[c], rig, count) for c, found in whole.items()}, short
+    return {c: _estimates(c, found, done[c], rig, count, kp) for c, found in whole.items()}, short
 
 
 def _estimates(
-    case: Case, found: Sequence[Fine], done: Sequence[Done], r: Sequence[Response], rig: RigFile, count: float
+    case: Case, found: Sequence[Fine], done: Sequence[Done], rig: RigFile, count: float, kp: float
 ) -> dict[str, Estimate]:  # fmt: skip
-    where, ways = case.where, [f.forward for f in found]
-    swings = [d.swing for d in done if d.swing is not None]
+    where, swings = case.where, [d.swing for d in done if d.swing is not None]
     tick = float(swings[0].t[1])
-    slope = 1 / math.sqrt(np.mean([1 / f.slopes[0] ** 2 + 1 / f.slopes[1] ** 2 for f in found]))
-    between = _read(f"edges/{where}", "encoder between its counts", BETWEEN * count, "rad")
-    crossings = _read(f"ticks/{where}", "sampling", tick * CROSSING, "s")
-    late = np.mean([f.settling_off(BETWEEN * count, FURTHER * count) for f in found], axis=0)
-    standing = within(f"standing/{where}", "where it stands within a count", count / 2, "rad")
-
-    def mean(values: Sequence[float], unit: str) -> Estimate:
-        parts = [[v for v, w in zip(values, ways, strict=True) if w is way] for way in WAYS]
-        return Estimate.exact(float(np.mean([np.mean(p) for p in parts])), unit)
-
+    between = _read(f"edges/{where}", "encoder between its counts",
+                    max(f.course.unsure(BETWEEN, count) for f in found), "rad")  # fmt: skip
+    crossings = _read(f"ticks/{where}", "sampling", tick * TICKS, "s")
+    tops = _ways(found, [f.overshoot for f in found])
+    starts = _ways(found, [f.began.edge for f in found])
+    higher = (
+        -float(np.mean(tops)) * count / case.size
+    )  # by a start that is a count further: the step is smaller by that
+    longer = float(np.mean([f.longer for f in found])) * count
+    loose = _loose(where, found)
+    top, dof = noise(tops, starts, higher)
+    rises = _ways(found, [f.rise for f in found])
     out = {
-        "rise_time": mean([f.rise for f in found], "s") + crossings * math.sqrt(2) + between * (1 / slope),
-        "overshoot": mean([f.overshoot for f in found], "1") + between * (1 / case.size),
-        "settling_time": mean([f.settling for f in found], "s") + crossings
-        + _read(f"edges/settling/{where}", "encoder between its counts", float(late[0]), "s")
-        + within(f"edges/swings/{where}", "whether a swing leaves the band", float(late[1]), "s"),
-        "final_error": mean([x.final_error for x in r], "rad") + standing,
+        "rise_time": _repeated(f"rise_time/{where}", "s", rises, *noise(rises, starts, longer))
+        + crossings * math.sqrt(2) + _in(loose * longer, "s"),
+        "overshoot": _repeated(f"overshoot/{where}", "1", tops, top, dof)
+        + between * (1 / case.size) + _in(loose * higher, "1"),
+        "settling_time": _settling(where, found, (top * case.size, dof), count) + crossings,
+        "final_error": _final(where, found, done, count, kp),
         **_peaks(where, found, done, rig),
         **bounds.estimates(where, swings, rig, case.allocation == "priority"),
     }  # fmt: skip
@@ -85,6 +94,40 @@ def _estimates(
     return out
 
 
+def _loose(where: str, found: Sequence[Fine]) -> Estimate:
+    """Zero, with what chance does to the mean start, counts: one that is loose may be anywhere between two edges."""
+    u = math.sqrt(sum(f.began.loose for f in found) / 12) / len(found)
+    influence = Influence(id=f"start/{where}", name="at which edge a step begins", u=u, unit="1", kind="B",
+                          distribution="normal")  # fmt: skip
+    return Estimate.of(0.0, influence)
+
+
+def _in(estimate: Estimate, unit: str) -> Estimate:
+    """The same in a unit, which a factor has brought."""
+    return Estimate(estimate.value, unit, estimate.sensitivities)
+
+
+def _settling(where: str, found: Sequence[Fine], top: tuple[float, int], count: float) -> Estimate:
+    """The mean over the steps; `top`: what noise does to a turning point as it is read, rad, and the degrees of freedom by
+    which it may be more."""
+    return settled(where, [f.settled for f in found], (max(top[0], EACH * count), top[1]), BETWEEN, count)
+
+
+def _final(where: str, found: Sequence[Fine], done: Sequence[Done], count: float, kp: float) -> Estimate:
+    """The mean of where the rotor stands, which is much the same in all steps of one way."""
+    gains = [f.course.gain for f in found if math.isfinite(f.course.gain)]
+    push = kp * count * float(np.median(gains)) if gains else math.nan
+    at = [stands(d, count, push) for d in done]
+    half = float(np.mean([a.half for a in at]))
+    return Estimate.exact(float(np.mean([a.error for a in at])), "rad") + within(
+        f"standing/{where}", "where it stands by its counts", half, "rad"
+    )
+
+
+def _ways(found: Sequence[Fine], values: Sequence[float]) -> list[list[float]]:
+    return [[v for v, f in zip(values, found, strict=True) if f.forward is way] for way in WAYS]
+
+
 def _peaks(where: str, found: Sequence[Fine], done: Sequence[Done], rig: RigFile) -> dict[str, Estimate]:
     """How far the mean path of each way goes, as a mean over both."""
     machine = conventions(rig)
@@ -94,10 +137,10 @@ def _peaks(where: str, found: Sequence[Fine], done: Sequence[Done], rig: RigFile
     for way in WAYS:
         pairs = [(f, d) for f, d in zip(found, done, strict=True) if f.forward is way]
         swings = [d.swing for _, d in pairs if d.swing is not None]
-        noise = bounds.noise_of(rig, tuple(machine.positions.values()), 1 / float(swings[0].t[1]))
+        loud = bounds.noise_of(rig, tuple(machine.positions.values()), 1 / float(swings[0].t[1]))
         after = [slice(f.answers, None) for f, _ in pairs]
-        outboard.append(peak_of([s.orbit[:, a] for s, a in zip(swings, after, strict=True)], noise))
-        motor.append(peak_of([s.motor[:, a] for s, a in zip(swings, after, strict=True)], noise * swings[0].spread))
+        outboard.append(peak_of([s.orbit[:, a] for s, a in zip(swings, after, strict=True)], loud))
+        motor.append(peak_of([s.motor[:, a] for s, a in zip(swings, after, strict=True)], loud * swings[0].spread))
         rests.append(np.mean([d.move.rest_orbit.mean(axis=1) for _, d in pairs], axis=0))
     still = [(float(np.hypot(*x)), x / max(float(np.hypot(*x)), 1e-300)) for x in rests]
     rest = Estimate.exact(float(np.mean([radius for radius, _ in still])), "m")
@@ -115,8 +158,8 @@ def _peaks(where: str, found: Sequence[Fine], done: Sequence[Done], rig: RigFile
 def _peak(identity: str, ways: Sequence[Peak]) -> Estimate:
     """The mean of the peaks of both ways, less what noise adds to them, m."""
     by, off = (float(np.mean(values)) for values in ([p.raised.by for p in ways], [p.raised.off for p in ways]))
-    noise = within(f"raised/{identity}", "noise in a peak", off, "m")
-    return _scattered(f"peak/{identity}", "m", [p.each for p in ways]) + noise - by
+    left = within(f"raised/{identity}", "noise in a peak", off, "m")
+    return _scattered(f"peak/{identity}", "m", [p.each for p in ways]) + left - by
 
 
 def _scattered(identity: str, unit: str, ways: Sequence[Sequence[float] | Array]) -> Estimate:
@@ -124,9 +167,15 @@ def _scattered(identity: str, unit: str, ways: Sequence[Sequence[float] | Array]
     parts = [np.asarray(p, float) for p in ways]
     dof = sum(len(p) - 1 for p in parts)
     s = math.sqrt(sum(float(((p - p.mean()) ** 2).sum()) for p in parts) / dof)
+    return _repeated(identity, unit, parts, s, dof)
+
+
+def _repeated(identity: str, unit: str, ways: Sequence[Sequence[float] | Array], s: float, dof: int) -> Estimate:
+    """Mean over both ways, each step of which has noise `s`."""
+    parts = [np.asarray(p, float) for p in ways]
     u = s * math.sqrt(sum(1 / len(p) for p in parts)) / len(parts)
     influence = Influence(id=f"scatter/{identity}", name="scatter of the repeats", u=u, unit=unit, kind="A",
-                          distribution="normal", dof=float(dof), source=f"{dof + len(parts)} steps")  # fmt: skip
+                          distribution="normal", dof=float(dof), source=f"{sum(map(len, parts))} steps")  # fmt: skip
     return Estimate.of(float(np.mean([p.mean() for p in parts])), influence)
 
 

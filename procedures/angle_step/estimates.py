@@ -10,7 +10,7 @@ import numpy as np
 
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
-from procedures.angle_step import captured, steps
+from procedures.angle_step import captured, counted, steps
 from procedures.angle_step.budget import OUTBOARD, at_motor, gained, sampled, within
 from procedures.angle_step.response import Response, response
 from procedures.angle_step.steps import Case, Done
@@ -29,8 +29,8 @@ class Result:
     short: int = 0
 
 
-def by_case(moves: list[Done], rig: RigFile, band: float, count_rad: float) -> dict[Case, Result]:
-    """Every case's result; `band` is a share of the step, `count_rad` one encoder count.
+def by_case(moves: list[Done], rig: RigFile, band: float, count_rad: float, kp: float) -> dict[Case, Result]:
+    """Every case's result; `band` is a share of the step, `count_rad` one encoder count, `kp` A/rad of the angle's loop.
 
     Raises:
         AnalysisError: a move does not reach its step.
@@ -41,13 +41,15 @@ def by_case(moves: list[Done], rig: RigFile, band: float, count_rad: float) -> d
     period = _period(moves)
     bands = {case: max(band * case.size, 2 * count_rad) for case in steps.by_case(moves)}
     responses = {c: tuple(response(d.move, bands[c]) for d in done) for c, done in steps.by_case(moves).items()}
-    finer, short = captured.by_case(moves, responses, rig, bands, count_rad)
-    return {
-        case: Result(
-            case, r, _estimates(case, r, gains, share, count_rad, period) | finer.get(case, {}), short.get(case, 0)
-        )
-        for case, r in responses.items()
-    }
+    finer, short = captured.by_case(moves, responses, rig, bands, count_rad, kp)
+    out = {}
+    for case, done in steps.by_case(moves).items():
+        r = responses[case]
+        found = _estimates(case, r, gains, share, count_rad, period)
+        if all(math.isfinite(x.settling) for x in r) and case not in finer:
+            found["settling_time"] = counted.settling_time(case.where, done, bands[case], count_rad)
+        out[case] = Result(case, r, found | finer.get(case, {}), short.get(case, 0))
+    return out
 
 
 def _period(moves: list[Done]) -> float:
@@ -65,13 +67,12 @@ def _estimates(
 
     slope = 1 / math.sqrt(np.mean([1 / x.slopes[0] ** 2 + 1 / x.slopes[1] ** 2 for x in r]))
     encoder = within(f"encoder/{where}", "encoder count", count / 2, "rad")
-    sampling = within(f"sampling/{where}", "sampling", period / 2, "s")
     each = sampled(f"sampling/each/{where}", period, len(r))
     floor = within(f"noise/{where}", "noise in a peak", max(x.floor for x in r), "m")
     outboard = gained([(x.peak, x.towards) for x in r], OUTBOARD, gains)
     at_rest = gained([(x.rest_peak, x.towards) for x in r], OUTBOARD, gains)
     motor = gained([(x.peak_motor, x.towards_motor) for x in r], at_motor(share), gains)
-    out = {
+    return {
         "rise_time": mean("rise_time", "s", lambda x: x.rise) + encoder * (1 / slope),
         "overshoot": mean("overshoot", "1", lambda x: x.overshoot) + encoder * (1 / case.size),
         "final_error": mean("final_error", "rad", lambda x: x.final_error) + encoder,
@@ -80,9 +81,6 @@ def _estimates(
         "excess": mean("excess", "m", lambda x: x.peak - x.rest_peak) + outboard - at_rest + floor,
         "saturated": mean("saturated", "s", lambda x: x.saturated) + each,
     }
-    if all(math.isfinite(x.settling) for x in r):
-        out["settling_time"] = mean("settling_time", "s", lambda x: x.settling) + sampling
-    return out
 
 
 def _repeated(identity: str, unit: str, values: Sequence[float]) -> Estimate:

@@ -10,41 +10,50 @@ import numpy as np
 import numpy.typing as npt
 
 from procedures.angle_step.bounds import Swing
-from procedures.angle_step.edges import Edges, edges
+from procedures.angle_step.course import Course, course
+from procedures.angle_step.edges import edges
+from procedures.angle_step.settling import Settling
+from procedures.angle_step.standing import Began, began
 from procedures.angle_step.steps import Done
 
 Array = npt.NDArray[np.float64]
 ANSWERS = 0.5  # of its greatest: the torque current that answers a step
-BETWEEN = 0.02  # of a count: rms of what a turning point between two edges is off (drawn swings)
-FURTHER = 0.3  # of a count: within so much a swing may leave the band in one step and not in the next
 SWING_S = 5e-3  # a swing that ends near the band leaves it or does not: a jump of more
+NEAR = 0.1  # of the rise: about a crossing, for the speed there
 
 
 @dataclass(frozen=True)
 class Fine:
-    """Of one step, `forward` or back: rise and settling s, overshoot as a share; `slopes` rad/s at 10 and 90 %; how long an
-    amplifier cut its demand, s, where the law tells; its `edges` from where it began, its `size` and the `band` of settling,
-    rad; and the tick at which the torque current `answers`."""
+    """Of one step, `forward` or back: rise and settling s, overshoot as a share; how long an amplifier cut its demand, s, where
+    the law tells; the `course` of the angle from where it began, its `size` and the `band` of settling, rad; the tick at
+    which the torque current `answers`; and at which edge the rotor stood before, `began`."""
 
     forward: bool
     rise: float
     settling: float
     overshoot: float
-    slopes: tuple[float, float]
     saturated: float | None
-    edges: Edges
+    course: Course
     size: float
     band: float
     answers: int
+    began: Began
 
-    def settling_off(self, unsure: float, most: float) -> tuple[float, float]:
-        """What an angle that is `unsure` by so much, rad, does to the settling time, s; and the jump of a swing that ends
-        within `most` rad of the band, and may leave it or not."""
-        last = self.edges.last_outside(self.size, self.band)
-        near, far = ([abs(self.edges.last_outside(self.size, self.band + k * by) - last) for k in (-1, 1)]
-                     for by in (unsure, most))  # fmt: skip
-        smooth = [s for s in near if s < SWING_S]
-        return max(smooth, default=0.0), max((s for s in far if s >= SWING_S), default=0.0)
+    @property
+    def longer(self) -> float:
+        """By how much a start that is further on makes the rise longer, s/rad, if the loop is linear: what is left of it when
+        the angle passes 10 % is 0.9, and 0.1 at 90 %."""
+        t, y = self.course.t, self.course.y
+        low, high = (self.course.crossing(share * self.size) for share in (0.1, 0.9))
+        near = (high - low) * NEAR
+        slow, fast = (float(np.interp(at + near, t, y) - np.interp(at - near, t, y)) / (2 * near) for at in (low, high))
+        return 0.9 / slow - 0.1 / fast
+
+    @property
+    def settled(self) -> Settling:
+        """By which its settling time is told."""
+        answers = float(self.course.t[self.answers])
+        return Settling(self.forward, self.course, self.size, self.band, answers, self.began.loose)
 
 
 def fine(done: Done, swing: Swing, settling: float, band: float, count: float) -> Fine | None:
@@ -53,20 +62,18 @@ def fine(done: Done, swing: Swing, settling: float, band: float, count: float) -
     size, way = abs(done.move.step), math.copysign(1.0, done.move.step)
     start = done.target - done.move.step
     turns = 2 * np.pi * np.round((swing.angle[0] - start) / (2 * np.pi))
-    found = edges(swing.t, swing.angle, count).since(start + turns, way)
-    low, high = found.crossing(0.1 * size), found.crossing(0.9 * size)
-    answers = answer(swing)
+    found, answers = edges(swing.t, swing.angle, count).since(start + turns, way), answer(swing)
+    angle = course(found, swing.t, way * (swing.angle - start - turns), way * swing.torque, answers)
+    low, high = angle.crossing(0.1 * size), angle.crossing(0.9 * size)
     if not math.isfinite(high) or float(swing.t[answers]) + settling + SWING_S > swing.t[-1]:
         return None
-    tops = [y for _, y in found.turning()]
     return Fine(
         forward=way > 0,
         rise=high - low,
-        settling=found.last_outside(size, band) - float(swing.t[answers]),
-        overshoot=max(max(tops, default=0.0) / size - 1, 0.0),
-        slopes=(_slope(found, low), _slope(found, high)),
+        settling=angle.last_outside(size, band) - float(swing.t[answers]),
+        overshoot=max(angle.top / size - 1, 0.0),
         saturated=swing.cut,
-        edges=found, size=size, band=band, answers=answers,
+        course=angle, size=size, band=band, answers=answers, began=began(done, swing.angle[: answers + 1], count),
     )  # fmt: skip
 
 
@@ -74,9 +81,3 @@ def answer(swing: Swing) -> int:
     """The tick at which the torque current answers: an encoder that changes its count at rest makes it jump too, but less."""
     torque = np.abs(swing.torque)
     return int(np.argmax(torque > ANSWERS * torque.max()))
-
-
-def _slope(found: Edges, at: float) -> float:
-    """Speed of the angle at a time, rad/s, by the edges about it."""
-    k = int(np.clip(np.searchsorted(found.t, at), 1, len(found.t) - 1))
-    return max(float((found.y[k] - found.y[k - 1]) / max(found.t[k] - found.t[k - 1], 1e-9)), 1e-6)

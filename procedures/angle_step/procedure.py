@@ -82,6 +82,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
         return
     write(rig, carried(rig.file, plan))
     carrying.carry(rig, plan.settle_s)
+    _begun(rig, plan)
     number = 0
     for case in planned(plan):
         write(rig, {"motor.allocation": CODES[case.allocation], "angle.low_pass_hz": case.filter_hz})
@@ -98,6 +99,16 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
             number += 1
     carrying.give_back(rig, 0.2)
     write(rig, {"angle.slew": stated(rig.file, "angle.slew").default})
+
+
+def _begun(rig: Rig, plan: Plan) -> None:
+    """A step each way that is not recorded. The rotor stands at whichever edge of its encoder's count the hand-over has left it
+    at, a count from where the steps leave it: the first would be another step than those that follow."""
+    case = planned(plan)[0]
+    write(rig, {"motor.allocation": CODES[case.allocation], "angle.low_pass_hz": case.filter_hz})
+    for target in (case.size, 0.0):
+        write(rig, {"angle.ref": target})
+        rig.clock.sleep(plan.standstill_s + plan.record_s)
 
 
 def carried(rig: RigFile, plan: Plan) -> dict[str, float]:
@@ -147,7 +158,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     plan, rig = recording.plan, recording.rig
     moves = read_moves(recording)
     findings.gate(checks.of_signals(moves, conventions(rig), plan), checks.FATAL)
-    by_case = estimates.by_case(moves, rig, plan.band, 2 * math.pi / plan.encoder_counts)
+    by_case = estimates.by_case(moves, rig, plan.band, 2 * math.pi / plan.encoder_counts, plan.kp_theta)
     findings.add(checks.of_responses(by_case, plan, {c: _loop(rig, plan, c) for c in by_case}))
     findings.add(checks.compared(by_case))
     return Results(moves, by_case, (conventions(rig).bearings[1], next(iter(rig.motors), "motor")))

@@ -7,7 +7,7 @@ stood before.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -24,7 +24,7 @@ class Move:
     """One step. `t` (n,); `angle` (n,) rad; `orbit` and `motor` (2, n) m: x and y off the sensors' zero, at the outboard
     sensor and at the motor; `segments` (4, n) A; `saturated` (n,) where an amplifier cut its demand; `rest_orbit` and
     `rest_motor` (2, m) m, `rest_segments` (4, m) A of the standstill before. `step` rad is signed; `components` of a segment's
-    current: its amplitude, or q and d in turn."""
+    current: its amplitude, or q and d in turn; `rest_angle` (m,) rad, as `angle`."""
 
     step: float
     t: Array
@@ -37,6 +37,7 @@ class Move:
     rest_motor: Array
     rest_segments: Array
     components: int = 1
+    rest_angle: Array = field(default_factory=lambda: np.empty(0))
 
     @property
     def torque(self) -> tuple[Array, Array]:

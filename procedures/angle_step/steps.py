@@ -162,6 +162,7 @@ def _move(
         rest_motor=motor[:, rest],
         rest_segments=segments[:, rest],
         components=machine.components,
+        rest_angle=angle[rest],
     )
 
 

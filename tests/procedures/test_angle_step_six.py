@@ -91,7 +91,7 @@ def test_a_capture_that_ends_before_its_step_is_said(nominal_run: Simulated, sec
     """A write that is delayed: from where the angle has not settled within 0.4 s, means of 1 ms are told, and no currents."""
     rig, plan = nominal_run.recording.rig, nominal_run.recording.plan
     moves = [d if k % 2 else late(d, seconds) for k, d in enumerate(read_moves(nominal_run.recording))]
-    found = estimates.by_case(moves, rig, plan.band, 2 * math.pi / plan.encoder_counts)
+    found = estimates.by_case(moves, rig, plan.band, 2 * math.pi / plan.encoder_counts, plan.kp_theta)
     assert [r.short for r in found.values()] == [short] * 2
     said = [
         f

@@ -79,13 +79,24 @@ def angle(done: Simulated) -> Found:
         settings_of(done), named(rig, {"angle.ref": wiring.TURN_RAD, "angle.kp": hold.PROBE_GAIN}),
         named(rig, {"angle.ref": 0.0} | {key: stated(rig, key).default for key in hold.GAINS}), named(rig, carried(rig, plan)),
         named(rig, {"motor.share": 1.0}), parameter(rig, "angle.ref"),
-        stated(rig, "motor.segment_limit").default, cases, plan.repeats, plan.settle_s, plan.standstill_s, plan.record_s,
-        _idle(done),
+        stated(rig, "motor.segment_limit").default, cases, plan.repeats,
+        1 / stated(rig, "motor.share_slew").default + plan.settle_s, *_lasted(done, parameter(rig, "angle.ref")), _idle(done),
     )  # fmt: skip
     outboard, motor = conventions(rig).bearings[1], next(iter(rig.motors), "motor")
     places = {"peak_outboard": outboard, "peak_motor": motor}
     for (name, where), value in of(rig, done.drawn, asked).items():
         yield ("peak", f"{places[name]}, {where}", value) if name in places else (name, where, value)
+
+
+def _lasted(done: Simulated, reference: str) -> tuple[float, float]:
+    """How long a step of the angle was recorded before and after its reference was written, s: by the plan, and what writing
+    takes, for the angle's integrator learns meanwhile."""
+    from procedures.angle_step.steps import STEP
+
+    written = [e["t_ns"] for e in done.recording.events("parameter") if e["name"] == reference]
+    whole = [(s, [t for t in written if s.start_ns <= t < s.end_ns]) for s in done.recording.steps(STEP)]
+    before, after = zip(*((t[-1] - s.start_ns, s.end_ns - t[-1]) for s, t in whole if t), strict=True)
+    return 1e-9 * sum(before) / len(before), 1e-9 * sum(after) / len(after)
 
 
 def _idle(done: Simulated) -> list[float]:

@@ -26,7 +26,8 @@ Array = npt.NDArray[np.float64]
 REPLICAS = 4  # of the run, each in noise of its own: a mean of steps that scatter is a truth only where they are many
 SEGMENT_SATURATED = 2
 ANSWERS = 0.5  # of its greatest: the torque current that answers a step
-SWINGS_S, TAIL_S = 0.3, 0.3  # of a record: where the shaft is looked at closely, and where it stands again
+SWINGS_S, TAIL_S = 0.3, 0.3  # of a record: where the shaft is looked at closely at least, and where it stands again
+CALM_S = 0.1  # within its band for so long, twice as long as a swing: then the angle has settled
 TURNED_S, HELD_S = 0.12, 7.0  # as long as the checks before the motor carries
 SEED = 20_000_001  # of noise that no run has; every rig has its own, for one that all share would be a bias of all
 SEGMENTS = [TRACE.index(f"i_m{k}") for k in range(1, 5)]
@@ -45,6 +46,7 @@ def angle_steps(rig: RigFile, drawn: Truth, asked: AngleAsked) -> Mapping[tuple[
     paths: dict[str, list[_Path]] = {}
     for replica in range(REPLICAS):
         machine = _Carried(rig, drawn, asked, (drawn.noise + SEED * (1 + replica)) % 2**63)
+        machine.begin(next(iter(asked.cases.values())))
         idle = iter(asked.idle)
         for where, case in asked.cases.items():
             for k in range(2 * asked.repeats):
@@ -118,6 +120,13 @@ class _Carried:
     def _wait(self, seconds: float) -> None:
         self.plant.run(round(seconds / TICK_S))
 
+    def begin(self, case: AngleCase) -> None:
+        """A step each way that is not recorded, as the run begins."""
+        self._write(case.settings)
+        for target in (case.size, 0.0):
+            self._write({self.asked.reference: target})
+            self._wait(self.asked.standstill_s + self.asked.record_s)
+
     def moved(self, case: AngleCase, k: int, idle_s: float) -> tuple[_Path, list[tuple[str, float]]]:
         """One step, to the angle (even `k`) or back, after nothing was recorded for `idle_s`."""
         if k == 0:
@@ -127,8 +136,9 @@ class _Carried:
         way = 1 if k % 2 == 0 else -1
         target = case.size if way > 0 else 0.0
         self._write({self.asked.reference: target})
-        after = self._recorded(SWINGS_S)
-        late = self.plant.run(round((self.asked.record_s - SWINGS_S - TAIL_S) / TICK_S))
+        after = self._swung(target, case.band)
+        left = self.asked.record_s - len(after.trace) * TICK_S - TAIL_S
+        late = self.plant.run(round(left / TICK_S))
         tail, later = self._standing(TAIL_S)
         torque = after.trace[:, SEGMENTS[:: 2 if self.p.phases == 6 else 1]].mean(axis=1)
         first = int(np.argmax(np.abs(torque) > ANSWERS * np.abs(torque).max()))
@@ -144,6 +154,21 @@ class _Carried:
             values.append(("bound_excess", _beyond(after.trace, self.asked.limit)))
         return _Path(way > 0, after.planes[..., first:], rest.planes.mean(axis=-1)), values
 
+    def _swung(self, target: float, band: float) -> _Seen:
+        """Until the angle has been within the band for a while, SWINGS_S at least: a swing that goes on would have too short a
+        time of settling."""
+        pieces, most = [self._recorded(SWINGS_S)], self.asked.record_s - TAIL_S
+        size = SWINGS_S + CALM_S
+        while size < most and np.abs(pieces[-1].angle[-round(CALM_S / TICK_S) :] - target).max() > band:
+            pieces.append(self._recorded(CALM_S))
+            size += CALM_S
+        return _Seen(
+            np.concatenate([x.angle for x in pieces]),
+            np.concatenate([x.planes for x in pieces], axis=-1),
+            np.concatenate([x.flags for x in pieces]),
+            np.concatenate([x.trace for x in pieces]),
+        )
+
     def _standing(self, seconds: float) -> tuple[float, Array]:
         """The mean angle, rad, and the telemetry."""
         angles, rows = [], []
@@ -153,8 +178,8 @@ class _Carried:
         return float(np.mean(angles)), np.concatenate(rows)
 
     def _recorded(self, seconds: float) -> _Seen:
-        """What the shaft does, from its state every millisecond: it moves smoothly in between (looked at three times
-        as often, peaks are 0.1 % higher)."""
+        """What the shaft does, from places and speeds every millisecond: it moves smoothly in between, but for what the
+        derivative of the encoder's counts kicks it by, which a spline of its places alone would round off."""
         from scipy import interpolate
 
         states, rows, trace = [self.plant.state()["s"]], [], []
@@ -164,12 +189,13 @@ class _Carried:
             rows.append(row)
             trace.append(ticks)
         whole = np.arange(len(states)) * PERIOD_TICKS
-        s = interpolate.CubicSpline(whole, np.array(states))(np.arange(whole[-1])).T
+        places, speeds = np.array(states)[:, :6], np.array(states)[:, 6:12] * TICK_S
+        s = interpolate.CubicHermiteSpline(whole, places, speeds)(np.arange(whole[-1])).T
         flags = np.concatenate(rows)[:, -1].astype(np.int64)
         return _Seen(s[5] + self.p.encoder_offset, self._planes(s), flags, np.concatenate(trace))
 
     def _planes(self, s: Array) -> Array:
-        """(2, 2, n) m off the sensors' zero: x and y at the outboard sensor and at the motor, of states (14, n)."""
+        """(2, 2, n) m off the sensors' zero: x and y at the outboard sensor and at the motor, of places (6, n)."""
         p, at = self.p, []
         for b, z in enumerate(p.z_sensor):
             turn = np.arange(1, 5)[:, None] * s[5] + np.array(p.target_phase[4 * b : 4 * b + 4])[:, None]
@@ -188,7 +214,7 @@ class _Carried:
 
 def _response(y: Array, first: int, case: AngleCase) -> Iterator[tuple[str, float]]:
     """`y` (n,) rad from where the reference stood, in the direction of the step; the torque current answers at `first`."""
-    low, high = (int(np.argmax(y > share * case.size)) for share in (0.1, 0.9))
+    low, high = (_crossing(y, share * case.size) for share in (0.1, 0.9))
     yield "rise_time", (high - low) * TICK_S
     yield "overshoot", max(float(y.max()) / case.size - 1, 0.0)
     size = np.abs(y - case.size)
@@ -197,6 +223,12 @@ def _response(y: Array, first: int, case: AngleCase) -> Iterator[tuple[str, floa
     inside = len(outside) and k + 1 < len(size)  # else it is never outside, or still is at the end
     part = (size[k] - case.band) / (size[k] - size[k + 1]) if inside else float(len(outside) > 0)
     yield "settling_time", (k + float(part) - first) * TICK_S
+
+
+def _crossing(y: Array, level: float) -> float:
+    """The tick, and part of one, at which `y` first passes a level: steps that are alike would all be rounded alike."""
+    k = max(int(np.argmax(y > level)), 1)
+    return k - 1 + float((level - y[k - 1]) / (y[k] - y[k - 1]))
 
 
 def _cut(trace: Array, limit: float) -> float:
