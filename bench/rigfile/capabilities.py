@@ -12,7 +12,7 @@ from typing import Any, Literal
 from pydantic import Field, model_validator
 
 from bench.rigfile.bit import Bit
-from bench.rigfile.capabilities_of_loops import CurrentStep, LoopInjection, Motion
+from bench.rigfile.capabilities_of_loops import CurrentStep, EncoderZero, LoopInjection, Motion
 from bench.rigfile.elements import Name
 from bench.rigfile.part import Part
 from bench.rigfile.toleranced import Toleranced
@@ -150,6 +150,7 @@ class Capabilities(Part):
     flatness: Mapping[Name, Flatness] = {}
     status: Status = Status()
     current_steps: Mapping[Name, CurrentStep] = {}
+    encoder_zeros: Mapping[Name, EncoderZero] = {}
     model: Mapping[Name, str] = {}
     landing_speed: str = ""
     lift_time: str = ""
@@ -172,6 +173,7 @@ class Capabilities(Part):
 MOVED = ("place", "place_rate", "place_rise", "angle", "angle_rate", "angle_rise", "gate", "gate_time")
 """Keys of a motion that are parameters."""
 STEP_PARAMETERS = ("parameter", "gain", "current_limit")
+ZERO_PARAMETERS = ("across", "zero")
 
 
 def parameters_named(c: Capabilities) -> Iterator[tuple[str, str]]:
@@ -207,6 +209,8 @@ def _tables(c: Capabilities) -> Iterator[tuple[str, str | Mapping[str, str]]]:
         yield from ((f"flatness.{law}.{key}", value) for key, value in flat)
     for place, step in c.current_steps.items():
         yield f"current_steps.{place}", {k: v for k in STEP_PARAMETERS if (v := getattr(step, k))}
+    for motor, one in c.encoder_zeros.items():
+        yield f"encoder_zeros.{motor}", {k: v for k in ZERO_PARAMETERS if (v := getattr(one, k))}
     yield "model", c.model
     for key in ("landing_speed", "lift_time", "watchdog", "current_limit"):
         yield key, getattr(c, key)

@@ -11,6 +11,7 @@ from pydantic import Field
 from bench.rigfile.bit import Bit
 from bench.rigfile.elements import Name
 from bench.rigfile.part import Part
+from bench.rigfile.toleranced import Toleranced
 
 InjectionPlace = Literal["sensor", "reference", "force"]
 
@@ -98,3 +99,18 @@ class CurrentStep(Part):
     def stated(self) -> tuple[str, ...]:
         """Numbers of `[machine]` that it names."""
         return tuple(name for name in (self.inductance, self.filter_inductance) if name)
+
+
+class EncoderZero(Part):
+    """Where the field of a motor lies against its encoder, as the controller lays the motor's currents: `step`, that of
+    `current_steps` which goes along the field; `across`, A, the parameter of one across it, which gives force; `loop`, that of
+    `loop_injection.loops` which holds what the motor moves: motors of one loop share what it asks for. `period` m or rad of
+    that loop's channel in an electrical turn. `zero`, the parameter that the controller takes for it, rad electrical, as the
+    reading counts: the field's phase is the reading's less it. `stated`: what the zero is said to be."""
+
+    step: str
+    across: str = ""
+    loop: str
+    period: Toleranced
+    zero: str
+    stated: Toleranced | None = None

@@ -148,3 +148,8 @@ CURRENT_STEP = (
     "standstill the currents are the same to the last digit. The order of the phases and the zeros are other tests'.",
     "A coil of the linear winding that is reversed and stands where its current gives no force: it pushes nothing there.",
 )
+ENCODER_ZERO = (
+    "A force along that comes with the current along the field, such as by saliency: it looks like a field that is laid wrong. "
+    "Of an actuator of 83.5 N/A 0.1 N for each ampere is 0.07° electrical.",
+    "A reference frame of the captured currents that is not the one in which the controller regulates them.",
+)
