@@ -20,6 +20,9 @@ from procedures.shared.certificates import certified, certified_gain
 
 Array = npt.NDArray[np.float64]
 RAD = "rad"
+SOFTER = (
+    0.2  # share of a loop's stiffness that cogging may have: forces balance at once but for what it changes on the way
+)
 
 
 @dataclass(frozen=True)
@@ -77,7 +80,8 @@ def _of_group(group: Group, places: Sequence[At], trials: Mapping[str, At], rig:
         mean = sum(each[1:], each[0]) / len(each)
         scatter = _scatter(f"{motor}", np.array([p.angles[:, j] for p in places]), RAD)
         turns[motor] = float(np.mean([p.field.angle[j] for p in places]))
-        left = math.exp(-settle_s(rig, plan, group) / slowest_s(rig, group.loop)) * abs(math.tan(turns[motor]))
+        share = SOFTER * math.exp(-settle_s(rig, plan, group) / slowest_s(rig, group.loop))
+        left = share * abs(math.tan(turns[motor]))
         unsettled = Influence(f"settling/{motor}", "what is left of the loop's settling", left / math.sqrt(3), RAD, "B",
                               "rectangular", source="the loop's gains, time waited")  # fmt: skip
         out["zero", motor] = mean + Estimate.of(0.0, scatter) + Estimate.of(0.0, unsettled)
