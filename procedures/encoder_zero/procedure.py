@@ -170,7 +170,8 @@ def figures(results: Results, recording: Recording[Plan]) -> Iterable[Figure]:
 def requires(rig: RigFile) -> Requires:
     """By the names that the rig has."""
     needed = ("encoder_zeros", "loop_injection", "current_steps", "motion")
-    if not rig.capabilities.encoder_zeros or rig.capabilities.loop_injection is None:
+    can = rig.capabilities
+    if not can.encoder_zeros or can.loop_injection is None or not can.current_steps:
         return Requires(capabilities=needed, capture=())
     of = groups.groups(rig)
     across = [(m, groups.zeros(rig)[m].across) for g in of for m, way in g.stepped if way != ALONG]
