@@ -17,7 +17,7 @@ class Plan(BenchPlan):
     current_A: float = Field(1.0, gt=0)  # either way, along the field and across it
     repeats: int = Field(5, ge=3)  # of + and -, of each current at each place
     window_s: float = Field(0.2, ge=0.05)  # of each mean, captured
-    time_constants: float = Field(6.0, ge=3)  # of the slowest part of the loop, waited for after each step
+    time_constants: float = Field(8.0, ge=3)  # of the slowest part of the loop, waited for after each step
     least_s: float = Field(0.1, ge=0.02)  # waited for at least
     trial_rad: float = Field(
         math.radians(5), ge=0, le=math.radians(20)

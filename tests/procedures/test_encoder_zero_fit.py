@@ -128,7 +128,7 @@ def test_how_long_is_waited() -> None:
     )
     assert slowest_s(slow, "gamma") > 9 * slowest_s(rig, "gamma")
     of = {g.loop: g for g in groups(rig)}
-    assert settle_s(rig, Plan(), of["gamma"]) == pytest.approx(6 * slowest_s(rig, "gamma"))
+    assert settle_s(rig, Plan(), of["gamma"]) == pytest.approx(8 * slowest_s(rig, "gamma"))
 
 
 def test_what_is_stepped() -> None:
