@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 
 import numpy as np
 
@@ -105,23 +105,30 @@ def _asked(found: Answers, rig: RigFile, e: int, motor: str, way: str, plan: Pla
     return abs(float(seen) / plan.current_A - 1)
 
 
-def of_results(results: Sequence[Result], rig: RigFile, plan: Plan) -> Iterator[Finding]:
-    """Places that disagree, motors against the others, zeros that are not taken, shared or off; how far they differ."""
+def of_results(results: Sequence[Result], rig: RigFile, plan: Plan, doubted: Collection[str] = ()) -> Iterator[Finding]:
+    """Places that disagree, motors against the others, zeros that are not taken, shared or off; how far they differ. Of what is
+    `doubted` already, a quantity as findings name it, no advice is given."""
     for found in results:
-        yield from _places(found)
-        yield from _trials(found, plan)
+        wrong = [*_places(found), *_trials(found, plan), *_against(found)]
+        yield from wrong
+        unsure = {*doubted, *(name for f in wrong for name in f.concerns)}
         for motor in found.group.motors:
-            if abs(found.turns[motor]) > AGAINST:
-                text = (f"its currents are laid {found.turns[motor] * DEG:.0f}° electrical off: it works against the others of "
-                        "its loop. Are its coils connected the other way round, or its phases exchanged?")  # fmt: skip
-                yield Finding("motor-reversed", text, motor, Effect.INDETERMINATE, names(found.group))
-            yield from _off(found, motor, rig)
+            if f"zero@{motor}" not in unsure:
+                yield from _off(found, motor, rig)
         for (one, other), by in differences(found).items():
             i = interval(by)
             told = "differ" if i.low > 0 or i.high < 0 else "may be one"
             ends = f"{i.low * DEG:.3f}° to {i.high * DEG:.3f}°"
             text = f"zeros of {one} and {other} {told}: {by.value * DEG:.3f}° electrical ({ends}) apart."
             yield Finding("zeros-compared", text, f"{one}, {other}", Effect.NOTE)
+
+
+def _against(found: Result) -> Iterator[Finding]:
+    for motor in found.group.motors:
+        if abs(found.turns[motor]) > AGAINST:
+            text = (f"its currents are laid {found.turns[motor] * DEG:.0f}° electrical off: it works against the others of its "
+                    "loop. Are its coils connected the other way round, or its phases exchanged?")  # fmt: skip
+            yield Finding("motor-reversed", text, motor, Effect.INDETERMINATE, names(found.group))
 
 
 def _places(found: Result) -> Iterator[Finding]:

@@ -125,9 +125,10 @@ class Results:
 def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     """Zeros and ratios."""
     taken, rig, plan = read_taken(recording), recording.rig, recording.plan
-    findings.gate(checks.of_signals(taken, rig, plan))
+    told = tuple(checks.of_signals(taken, rig, plan))
+    findings.gate(told)
     found = estimates.results(taken, rig, plan)
-    findings.add(checks.of_results(found, rig, plan))
+    findings.add(checks.of_results(found, rig, plan, {name for one in told for name in one.concerns}))
     return Results(tuple(found), tuple(taken))
 
 

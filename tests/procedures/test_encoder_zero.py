@@ -84,7 +84,7 @@ def test_one_zero_for_both(tmp_path: Path) -> None:
 @pytest.mark.long
 def test_a_slow_integrator(tmp_path: Path) -> None:
     """A tenth of the stated gain: the mover is still on its way back."""
-    done = run(tmp_path, {**REDUCED, "integrator_factor": 0.1}, **ROTARY, trial_rad=0.0)
+    done = run(tmp_path, {**REDUCED, "factor_ki_r": 0.1}, **ROTARY, trial_rad=0.0)
     assert "mover-moved" in codes(done)
 
 
@@ -176,6 +176,15 @@ def test_zeros_that_are_shared_or_not_taken() -> None:
 def test_a_motor_the_other_way_round() -> None:
     plan = Plan(repeats=3, trial_rad=0.0)
     assert told(recorded(plan, {**TURN, "RA1": math.pi - 1.2}), plan) == {"motor-reversed"}
+
+
+def test_no_advice_of_what_is_in_doubt() -> None:
+    """A zero that is off is not told, and not to be set, where a loop was at its limit."""
+    plan = Plan(repeats=3, trial_rad=0.0)
+    found = estimates.results(recorded(plan, {**TURN, "LA": 0.1}), RIG, plan)
+    said = [(f.code, f.where) for f in checks.of_results(found, RIG, plan) if f.code == "zero-off"]
+    assert said == [("zero-off", "LA")]
+    assert not [f for f in checks.of_results(found, RIG, plan, {"zero@LA"}) if f.code == "zero-off"]
 
 
 def test_the_controllers_own_zero_is_in_it() -> None:

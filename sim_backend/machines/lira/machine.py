@@ -42,6 +42,7 @@ DEFECTS = {
     "coil_reversed": 0.0, "exchange_phases": 0.0, "exchange_actuators": 0.0, "zero_off_ra": 0.0, "zero_off_la": 0.0,
     "one_zero": 0.0, "adc_late_s": 0.0, "no_pull": 0.0, "position_sign_x1": 1.0, "position_sign_y1": 1.0,
     "factor_kp_s": 1.0, "factor_kp_sl": 1.0, "factor_kp_v": 1.0, "factor_current_max": 1.0, "capacitance_factor": 1.0,
+    "factor_ki_r": 1.0, "factor_ki_z": 1.0,
 }  # fmt: skip
 """Planted defects and their harmless values. `coil_reversed`: number of the coil that is connected the other way round;
 `exchange_phases`: b and c of rotary actuator 1 or 2, or of both (3), exchanged at the terminals; `exchange_actuators`: 1, the
@@ -49,7 +50,7 @@ half-bridges of one drive the other; `zero_off_*` rad electrical: encoder turned
 the firmware takes the zero of the first rotary actuator for both; `adc_late_s`: of the half-bridges' readings; `no_pull`: 1,
 the observers do not know the negative stiffness; `position_sign_*`: of a probe; `factor_*`: what the firmware has of
 a gain or a limit that it was told; `capacitance_factor`: of every capacitor, beside what it was drawn with."""
-FACTORS: Final = ("kp_s", "kp_sl", "kp_v", "current_max")
+FACTORS: Final = ("kp_s", "kp_sl", "kp_v", "current_max", "ki_r", "ki_z")
 ELECTRICAL: Final = (
     "coil_reversed",
     "exchange_phases",
