@@ -12,7 +12,7 @@ from typing import Any, Literal
 from pydantic import Field, model_validator
 
 from bench.rigfile.bit import Bit
-from bench.rigfile.capabilities_of_loops import CurrentStep, ForceCurrent, Hold, LoopInjection, Motion
+from bench.rigfile.capabilities_of_loops import CurrentStep, EncoderZero, ForceCurrent, Hold, LoopInjection, Motion
 from bench.rigfile.elements import Name
 from bench.rigfile.part import Part
 from bench.rigfile.toleranced import Toleranced
@@ -153,6 +153,7 @@ class Capabilities(Part):
     status: Status = Status()
     current_steps: Mapping[Name, CurrentStep] = {}
     force_currents: Mapping[Name, ForceCurrent] = {}
+    encoder_zeros: Mapping[Name, EncoderZero] = {}
     model: Mapping[Name, str] = {}
     landing_speed: str = ""
     lift_time: str = ""
@@ -177,6 +178,7 @@ MOVED = ("place", "place_rate", "place_rise", "angle", "angle_rate", "angle_rise
 HELD = ("begin", "across", "push", "bound", "limit")
 """Those of a hold."""
 STEP_PARAMETERS = ("parameter", "gain", "current_limit")
+ZERO_PARAMETERS = ("across", "zero")
 
 
 def parameters_named(c: Capabilities) -> Iterator[tuple[str, str]]:
@@ -215,6 +217,8 @@ def _tables(c: Capabilities) -> Iterator[tuple[str, str | Mapping[str, str]]]:
     for place, step in c.current_steps.items():
         yield f"current_steps.{place}", {k: v for k in STEP_PARAMETERS if (v := getattr(step, k))}
     yield "force_currents", {name: one.added for name, one in c.force_currents.items() if one.added}
+    for motor, one in c.encoder_zeros.items():
+        yield f"encoder_zeros.{motor}", {k: v for k in ZERO_PARAMETERS if (v := getattr(one, k))}
     yield "model", c.model
     for key in ("landing_speed", "lift_time", "watchdog", "current_limit"):
         yield key, getattr(c, key)

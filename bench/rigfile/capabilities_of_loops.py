@@ -144,3 +144,18 @@ class ForceCurrent(Part):
     added: str = ""
     period: str = ""
     zero: Toleranced
+
+
+class EncoderZero(Part):
+    """Where the field of a motor lies against its encoder, as the controller lays the motor's currents: `step`, that of
+    `current_steps` which goes along the field; `across`, A, the parameter of one across it, which gives force; `loop`, that of
+    `loop_injection.loops` which holds what the motor moves: motors of one loop share what it asks for. `period` m or rad of
+    that loop's channel in an electrical turn. `zero`, the parameter that the controller takes for it, rad electrical, as the
+    reading counts: the field's phase is the reading's less it. `stated`: what the zero is said to be."""
+
+    step: str
+    across: str = ""
+    loop: str
+    period: Toleranced
+    zero: str
+    stated: Toleranced | None = None

@@ -161,3 +161,8 @@ ACTUATOR_CONSTANT = (
     "Time is the controller's: a clock that is fast by 1e-4 changes constants by 2e-4.",
     "A scale of the position beyond its certificate changes the constants along by its share.",
 )
+ENCODER_ZERO = (
+    "A force along that comes with the current along the field, such as by saliency: it looks like a field that is laid wrong. "
+    "Of an actuator of 83.5 N/A 0.1 N for each ampere is 0.07° electrical.",
+    "A reference frame of the captured currents that is not the one in which the controller regulates them.",
+)

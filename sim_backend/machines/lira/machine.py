@@ -44,6 +44,7 @@ DEFECTS = {
     "one_zero": 0.0, "adc_late_s": 0.0, "no_pull": 0.0, "position_sign_x1": 1.0, "position_sign_y1": 1.0,
     "factor_kp_s": 1.0, "factor_kp_sl": 1.0, "factor_kp_v": 1.0, "factor_current_max": 1.0, "capacitance_factor": 1.0,
     "hold_one_plane": 0.0, "hold_deaf": 0.0,
+    "factor_ki_r": 1.0, "factor_ki_z": 1.0,
 }  # fmt: skip
 """Planted defects and their harmless values. `coil_reversed`: number of the coil that is connected the other way round;
 `exchange_phases`: b and c of rotary actuator 1 or 2, or of both (3), exchanged at the terminals; `exchange_actuators`: 1, the
@@ -52,7 +53,7 @@ the firmware takes the zero of the first rotary actuator for both; `adc_late_s`:
 the observers do not know the negative stiffness; `position_sign_*`: of a probe; `factor_*`: what the firmware has of
 a gain or a limit that it was told; `capacitance_factor`: of every capacitor, beside what it was drawn with; `hold_one_plane`:
 1, a hold pushes the first plane alone; `hold_deaf`: 1, a hold is answered and does not come."""
-FACTORS: Final = ("kp_s", "kp_sl", "kp_v", "current_max")
+FACTORS: Final = ("kp_s", "kp_sl", "kp_v", "current_max", "ki_r", "ki_z")
 ELECTRICAL: Final = (
     "coil_reversed",
     "exchange_phases",
