@@ -54,6 +54,7 @@ PROCEDURES = (
     _room("estimator-compare", "Velocity estimators in the loop: errors before, answers to a load"),
     _room("mission", "Lift, moves along and around at once, landing, on a linear-rotary machine"),
     _room("current-step", "Step response of the current loops: rise, bands, what goes across"),
+    _room("coil-map", "Coils, phases and actuators: is each where the controller takes it to be?"),
     _room("force-map", "Terms of the motor's force over displacement, currents and load"),
 )
 

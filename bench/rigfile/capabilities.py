@@ -12,6 +12,7 @@ from typing import Any, Literal
 from pydantic import Field, model_validator
 
 from bench.rigfile.bit import Bit
+from bench.rigfile.capabilities_of_coils import CoilMap
 from bench.rigfile.capabilities_of_loops import CurrentStep, LoopInjection, Motion
 from bench.rigfile.elements import Name
 from bench.rigfile.part import Part
@@ -150,6 +151,7 @@ class Capabilities(Part):
     flatness: Mapping[Name, Flatness] = {}
     status: Status = Status()
     current_steps: Mapping[Name, CurrentStep] = {}
+    coil_map: CoilMap | None = None
     model: Mapping[Name, str] = {}
     landing_speed: str = ""
     lift_time: str = ""
@@ -207,6 +209,8 @@ def _tables(c: Capabilities) -> Iterator[tuple[str, str | Mapping[str, str]]]:
         yield from ((f"flatness.{law}.{key}", value) for key, value in flat)
     for place, step in c.current_steps.items():
         yield f"current_steps.{place}", {k: v for k in STEP_PARAMETERS if (v := getattr(step, k))}
+    if c.coil_map is not None:
+        yield from _of_coils(c.coil_map)
     yield "model", c.model
     for key in ("landing_speed", "lift_time", "watchdog", "current_limit"):
         yield key, getattr(c, key)
@@ -216,6 +220,12 @@ def _of_loops(can: LoopInjection) -> Iterator[tuple[str, str | Mapping[str, str]
     yield from ((f"loop_injection.{key}", getattr(can, key)) for key in ("axis", "place", "amplitude", "hz"))
     for name, one in can.loops.items():
         yield from ((f"loop_injection.loops.{name}.{key}", getattr(one, key)) for key in ("kp", "ki", "kd", "limit"))
+
+
+def _of_coils(found: CoilMap) -> Iterator[tuple[str, str | Mapping[str, str]]]:
+    for name, system in found.systems.items():
+        yield from ((f"coil_map.systems.{name}.{key}", getattr(system, key)) for key in ("d", "q", "zero"))
+    yield "coil_map.still", {name: name for name in found.still}
 
 
 def is_bound(c: Capabilities, key: str) -> bool:

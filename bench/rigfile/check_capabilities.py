@@ -8,6 +8,7 @@ from bench import units
 from bench.errors import Problem
 from bench.rigfile.bit import Bit
 from bench.rigfile.capabilities import parameters_named
+from bench.rigfile.check_coil_map import problems_of as problems_of_coil_map
 from bench.rigfile.check_current_steps import near
 from bench.rigfile.check_current_steps import problems_of as problems_of_current_steps
 from bench.rigfile.model import RigFile
@@ -30,6 +31,7 @@ def problems_of(rig: RigFile) -> Iterator[Problem]:
         *_delay(rig),
         *_angle(rig),
         *problems_of_current_steps(rig),
+        *problems_of_coil_map(rig),
     ):
         yield Problem(rig.path, f"capabilities.{key}", found, expected)
 
