@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from bench.cli.truths import linear_rotary, motor, one_axis, rotor
+from bench.cli.truths import coils, linear_rotary, motor, one_axis, rotor
 from bench.cli.truths.settings import Found
 from bench.errors import BenchError
 from bench.procedure import Measured
@@ -50,4 +50,5 @@ TRUTHS: Mapping[str, Callable[[Any], Found]] = {
     "estimator-compare": one_axis.compare,
     "mission": linear_rotary.mission,
     "current-step": linear_rotary.currents,
+    "coil-map": coils.shares,
 }

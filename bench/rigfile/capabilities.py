@@ -225,7 +225,8 @@ def _of_loops(can: LoopInjection) -> Iterator[tuple[str, str | Mapping[str, str]
 def _of_coils(found: CoilMap) -> Iterator[tuple[str, str | Mapping[str, str]]]:
     for name, system in found.systems.items():
         yield from ((f"coil_map.systems.{name}.{key}", getattr(system, key)) for key in ("d", "q", "zero"))
-    yield "coil_map.still", {name: name for name in found.still}
+    for axis, values in found.still.items():
+        yield f"coil_map.still.{axis}", {name: name for name in values}
 
 
 def is_bound(c: Capabilities, key: str) -> bool:

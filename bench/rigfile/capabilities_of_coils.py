@@ -35,13 +35,13 @@ class CoilSystem(Part):
 
 class CoilMap(Part):
     """Coils of a winding: the current `systems` by name; by coil the channel of the current of the half-bridge that drives it,
-    `bridges`; `stars` of coils whose currents have no other way. `still` are the values of parameters at which the controller
-    holds no position by itself, so that what flows is what it was told."""
+    `bridges`; `stars` of coils whose currents have no other way. `still` are by axis the values of parameters at which the
+    controller does not hold it, so that what flows is what it was told."""
 
     systems: Mapping[Name, CoilSystem] = Field(min_length=1)
     bridges: Mapping[str, str] = {}
     stars: tuple[tuple[str, ...], ...] = ()
-    still: Mapping[str, float] = {}
+    still: Mapping[str, Mapping[str, float]] = {}
 
     @property
     def coils(self) -> tuple[str, ...]:

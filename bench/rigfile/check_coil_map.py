@@ -47,6 +47,9 @@ def _coils(rig: RigFile, found: CoilMap) -> Iterator[Line]:
         yield from _captured(rig, "coil_map.bridges", bridge, "A")
         if coil not in found.coils:
             yield "coil_map.bridges", repr(coil), f"a coil of a system{near(coil, found.coils)}"
+    for axis in found.still:
+        if axis not in found.axes:
+            yield "coil_map.still", repr(axis), f"an axis of a system{near(axis, found.axes)}"
     for star in found.stars:
         for coil in star:
             if coil not in found.coils:

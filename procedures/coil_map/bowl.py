@@ -88,5 +88,24 @@ def fitted(currents: Array, beside: Array, places: Array) -> Bowl:
     p = best.x
     s, per = p[:4].reshape(2, 2), scale
     of_s = max(float(np.linalg.norm(s, 2)), 1e-12)
+    m = p[6:8] / of_s if np.ptp(beside) > 0 else np.zeros(2)
     rest = float(np.sqrt(np.mean(best.fun[:-1] ** 2))) * size
-    return Bowl(middle + size * p[8:10], size * float(p[10]), p[4:6] / of_s * per, s / of_s, p[6:8] / of_s, rest)
+    return Bowl(middle + size * p[8:10], size * float(p[10]), p[4:6] / of_s * per, s / of_s, m, rest)
+
+
+def rest_of(pushes: Array, places: Array) -> float:
+    """What is left of places (n, 2) m, root mean square, by pushes (n, 2) A that are known but for what acts beside them."""
+    middle, size = places.mean(axis=0), max(swing(places) / 2, 1e-9)
+    scale = float(np.sqrt((pushes**2).sum(axis=1).max()))
+    i, r = pushes / scale, (places - middle) / size
+
+    def left(p: Array) -> Array:
+        v = i + p[:2]
+        length = np.sqrt((v**2).sum(axis=1) + 1e-6)[:, None]
+        return np.asarray((p[2:4] + p[4] * v / length + p[5] * v - r).ravel())
+
+    low, high = [-3.0, -3.0, -1.0, -1.0, CLEAR[0], 0.0], [3.0, 3.0, 1.0, 1.0, CLEAR[1], GIVES]
+    starts = ([0.3 * math.cos(a), 0.3 * math.sin(a), 0.0, 0.0, 1.0, 0.05] for a in (-math.pi / 2, math.pi / 2))
+    found = [least_squares(left, s, bounds=(low, high), max_nfev=40, loss="soft_l1", f_scale=0.1) for s in starts]
+    best = min(found, key=lambda f: float(f.cost))
+    return float(np.sqrt(np.mean(best.fun**2))) * size

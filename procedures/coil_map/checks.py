@@ -15,10 +15,12 @@ from procedures.coil_map.steps import WAYS, radial
 
 DEAD = 0.3  # of its share, below which a coil carries nothing
 ELSEWHERE = 0.05  # of a pulse, in a coil that its system does not have
-APART = 0.03  # by which two sensors of one current may differ, and by so many
-SURE = 4.5  # standard uncertainties more
+APART = 0.03  # by which two sensors of one current may differ, beside so many standard uncertainties
+SURE = 9.0  # noise of a loop is not white: twice 4.5
 STAR = 0.05  # of a pulse: what a star's currents may sum up to
 CROSS = 0.06  # A of a bearing current that 1 A of torque current along d may push like
+EXPLAINS = 0.7  # of what a sound winding leaves, at most, that a coil must leave
+TURNED = 0.6  # rad, electrical, that the mover may turn while a push goes around
 ALONG = 0.35  # of what q moves, that d may
 MOVES = 10e-6  # that a turned push moves its plane by at least
 CABLE = "Look at the cable of"
@@ -40,6 +42,10 @@ def of_flow(r: Result, plan: Plan) -> Iterator[Finding]:
 
 def of_currents(r: Result, plan: Plan) -> Iterator[Finding]:
     """Whether each coil carries what it should."""
+    open_ = list(_stars(r))
+    if open_:
+        yield from open_
+        return
     dead = [c for c in r.can.coils if abs(r.coils[c]) < DEAD]
     for coil in dead:
         text = (f"coil {coil} carries {r.coils[coil]:.2f} of what it is asked for: its circuit is open, or its sensor is dead. "
@@ -47,7 +53,6 @@ def of_currents(r: Result, plan: Plan) -> Iterator[Finding]:
         yield _wrong("coil-dead", text, coil)
     if dead:
         return
-    yield from _stars(r)
     yield from _elsewhere(r)
     for (name, way), (along, across) in zip(r.rows, r.read, strict=True):
         if abs(along - 1) > plan.max_off or abs(across) > plan.max_off:
@@ -57,7 +62,7 @@ def of_currents(r: Result, plan: Plan) -> Iterator[Finding]:
     for coil in r.can.coils:
         own, (bridge, u) = r.coils[coil], r.bridges.get(coil, (math.nan, math.nan))
         if abs(own - bridge) > APART + SURE * u:
-            which = coil if abs(own - 1) > abs(bridge - 1) else r.can.bridges[coil]
+            which = coil if abs(own - 1) > APART / 2 else r.can.bridges[coil]  # the loops go by the coil's own
             text = (f"of what coil {coil} is asked for its own sensor reads {own:.3f}, that of its half-bridge {bridge:.3f}: "
                     f"one of them is wrong, rather {which}. Compare their gains.")  # fmt: skip
             yield _wrong("current-sensors-disagree", text, coil, Effect.INDETERMINATE)
@@ -73,6 +78,8 @@ def _stars(r: Result) -> Iterator[Finding]:
     if not open_:
         return
     pair = decode.across_stars(r.can, r.expected, r.found)
+    if pair is None and any(abs(r.coils[c] - b) > APART + SURE * u for c, (b, u) in r.bridges.items()):
+        return  # a sensor of one coil, which is told below
     which = (f"The cables of {pair[0]} and {pair[1]} exchanged would make it so." if pair
              else "A current leaks, or more than two cables are exchanged.")  # fmt: skip
     stars = "; ".join(", ".join(star) for star in open_)
@@ -118,15 +125,10 @@ def _span(r: Result, name: str) -> str:
 def _of_push(r: Result, name: str, p: Pushed, plan: Plan) -> Iterator[Finding]:
     bowl, system = p.bowl, r.can.systems[name]
     cross = math.hypot(*bowl.m)
-    if bowl.roundness < plan.min_round or cross > CROSS:
-        coil, gives, either = decode.weak_coil(r.can, name, bowl, p.phi)
-        what = "is connected the other way round" if gives < -0.4 else f"gives some {max(gives, 0):.0%} of its force"
-        text = (f"{name} pushes {bowl.roundness:.2f} as hard in one direction as in the other, and 1 A of torque current along d "
-                f"pushes like {cross:.2f} A of it: coil {coil} {what}{', or the one opposite' if either else ''}. "
-                f"{CABLE} {coil}.")  # fmt: skip
-        yield _wrong("coil-reversed" if gives < -0.4 else "coil-weak", text, coil)
+    if bowl.roundness < plan.min_round or cross > CROSS or p.turned > TURNED:
+        yield _of_coil(r, name, p)
     elif bowl.mirrored:
-        pairs = decode.exchanged_phases(system, bowl.angle, p.phi)
+        pairs = decode.exchanged_phases(system, bowl.angle, float(p.tour.phi.mean()))
         each = ", ".join(f"{a} and {b}" for a, b in pairs)
         text = (f"what {name} pushes turns the other way than its current: two phases are exchanged, and no current shows it. "
                 f"Exchange the cables of {each}. {_probe(system.axes)}")  # fmt: skip
@@ -139,6 +141,20 @@ def _of_push(r: Result, name: str, p: Pushed, plan: Plan) -> Iterator[Finding]:
         text = (f"what {name} pushes stands {math.degrees(bowl.angle):+.0f}° (electrical) from where it should: the cables of "
                 f"{_span(r, name)} are moved on in a ring, or the zero of the angle is off by as much.")  # fmt: skip
         yield _wrong("push-turned", text, name)
+
+
+def _of_coil(r: Result, name: str, p: Pushed) -> Finding:
+    """One coil that gives less force than the others, or the opposite one, if that explains where the mover lay."""
+    coil, gives, left, sound = decode.weak_coil(r.can, p.tour, p.places)
+    shown = (f"{name} pushes {p.bowl.roundness:.2f} as hard in one direction as in the other, 1 A of torque current along d pushes "
+             f"like {math.hypot(*p.bowl.m):.2f} A of it, and the mover turned by {math.degrees(p.turned):.0f}° (electrical)")  # fmt: skip
+    if left > EXPLAINS * sound:
+        text = (f"{shown}: no single coil explains that well, {coil} best. {CABLE} {coil}, then at those of {_span(r, name)}, and "
+                "whether the mover is free.")  # fmt: skip
+        return _wrong("pushes-unexplained", text, name)
+    what = "is connected the other way round" if gives < -0.4 else f"gives some {gives:.0%} of its force"
+    text = f"{shown}: coil {coil} {what} (leaves {left * 1e6:.1f} µm, a sound winding {sound * 1e6:.1f} µm). {CABLE} {coil}."
+    return _wrong("coil-reversed" if gives < -0.4 else "coil-weak", text, coil)
 
 
 def _probe(axes: Sequence[str]) -> str:
@@ -160,7 +176,9 @@ def of_turns(r: Result, plan: Plan, explained: bool) -> Iterator[Finding]:
             yield _wrong("nothing-moves", text, name)
         elif q < least or abs(d) > ALONG * abs(q):
             causes = decode.thrust(system, d, q, r.phi[name]) if system.gives == "axial force" else []
-            which = f"It would be so with {'; or '.join(causes)}." if causes else f"Look at the cables of {_span(r, name)}."
+            which = (
+                f"It would be so with {'; or '.join(causes)}." if causes else f"Look at the cables of {_span(r, name)}."
+            )
             text = f"pulses of {name} should move {axis} up along q and not along d, and moved it: {shown}. {which}"
             yield _wrong("moves-wrongly", text, name)
 

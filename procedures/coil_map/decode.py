@@ -11,22 +11,18 @@ import numpy.typing as npt
 
 from bench.rigfile.capabilities_of_coils import CoilMap, CoilSystem
 from procedures.coil_map import winding
-from procedures.coil_map.bowl import Bowl
+from procedures.coil_map.bowl import rest_of
+from procedures.coil_map.steps import Tour
 
 Array = npt.NDArray[np.float64]
 DEG = math.pi / 180
-GIVES = tuple(k / 10 for k in range(-10, 11))  # shares of its force that a coil is tried with
+GIVES = (-1.0, -0.5, 0.0, 0.25, 0.5, 0.7, 0.85)  # shares of its force that a coil is tried with
 NEAR = 0.35  # of a direction, rad: as near as a thrust that friction bends tells
-
-
-def turned(rotation: float) -> Array:
-    """A turn by an angle, (2, 2)."""
-    c, s = math.cos(rotation), math.sin(rotation)
-    return np.array([[c, -s], [s, c]])
 
 
 def mirrored_pairs(system: CoilSystem, axis_deg: float) -> list[tuple[str, str]]:
     """Coils that change places where phases p and `axis_deg` - p do."""
+
     def off(p: float, q: float) -> float:
         return abs((p + q - axis_deg + 180) % 360 - 180)
 
@@ -43,21 +39,27 @@ def exchanged_phases(system: CoilSystem, angle: float, phi: float) -> list[tuple
     return mirrored_pairs(system, axis)
 
 
-def weak_coil(can: CoilMap, name: str, bowl: Bowl, phi: float) -> tuple[str, float, bool]:
-    """The coil of a radial system that explains its pushes best, the share of its force that it gives, and whether the one
-    opposite would explain them as well."""
-    system, other = can.systems[name], winding.beside(can, name)
-    back = turned(-bowl.angle)
-    s, m = back @ bowl.s, back @ bowl.m
-    tried = []
-    for coil, gives in itertools.product(system.coils, GIVES):
-        model = winding.taken_by(system, coil, phi, gives)
-        top = float(np.linalg.norm(model, 2))
-        cross = winding.crossed(system, can.systems[other], coil, phi, gives) / top if other else np.zeros(2)
-        tried.append((float(((s - model / top) ** 2).sum() + 2 * ((m - cross) ** 2).sum() * bool(other)), coil, gives))
-    best = min(tried)
-    rival = min(t for t in tried if t[1] != best[1])
-    return best[1], best[2], rival[0] < 1.5 * best[0] + 1e-4
+def weak_coil(can: CoilMap, tour: Tour, places: Array) -> tuple[str, float, float, float]:
+    """The coil of a radial system that explains a turned push best, the share of its force that it gives; what it leaves of
+    the places, m, and what a winding without fault leaves."""
+    system, other = can.systems[tour.system], winding.beside(can, tour.system)
+    tried = [(rest_of(_pushes(system, can.systems[other] if other else None, tour, coil, gives), places), coil, gives)
+             for coil in system.coils for gives in GIVES]  # fmt: skip
+    sound = rest_of(tour.currents, places)
+    left, coil, gives = min(tried)
+    return coil, gives, left, sound
+
+
+def _pushes(system: CoilSystem, other: CoilSystem | None, tour: Tour, coil: str, gives: float) -> Array:
+    """What a system pushes with such a coil, at the angle and with the torque currents of each place, (n, 2)."""
+    out = np.array(
+        [winding.taken_by(system, coil, phi, gives) @ i for phi, i in zip(tour.phi, tour.currents, strict=True)]
+    )
+    if other is not None:
+        for way, current in (("d", tour.beside), ("q", tour.beside_q)):
+            share = winding.of_way(other, way, tour.phi)[coil] * current * -(1 - gives) * 2 / len(system.coils)
+            out += share[:, None] * np.array([winding.unit(system, coil, phi) for phi in tour.phi])
+    return out
 
 
 def thrust(system: CoilSystem, along: float, across: float, phi: float) -> list[str]:

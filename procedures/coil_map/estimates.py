@@ -24,13 +24,22 @@ Row = tuple[str, str]
 @dataclass(frozen=True)
 class Pushed:
     """What a turned push moved: by radial system how far its axes went, m, and which of them it moved most, `most`; the bowl of
-    that, where it was (n, 2) m, and the electrical angle, rad."""
+    that, and all of it."""
 
     far: Mapping[str, float]
     most: str
     bowl: Bowl
-    places: Array
-    phi: float
+    tour: Tour
+
+    @property
+    def places(self) -> Array:
+        """Where those axes were, (n, 2) m."""
+        return self.tour.places[self.most]
+
+    @property
+    def turned(self) -> float:
+        """How far the mover turned meanwhile, electrical, rad."""
+        return float(np.ptp(self.tour.phi))
 
 
 @dataclass(frozen=True)
@@ -70,11 +79,13 @@ def evaluate(pulses: Sequence[Pulse], tours: Mapping[str, Tour], rig: RigFile) -
         return np.array([[_mean([getattr(p, value)[c] / p.size for p in first[row] if c in getattr(p, value)])
                           for c in can.coils] for row in rows])  # fmt: skip
 
-    read = np.array([np.mean([(p.read if p.way == "d" else p.read[::-1]) / p.size for p in of[row]], axis=0) for row in rows])
+    read = np.array(
+        [np.mean([(p.read if p.way == "d" else p.read[::-1]) / p.size for p in of[row]], axis=0) for row in rows]
+    )
     return Result(
         can, {c: _share(rig, c, _shares(pulses, c)) for c in can.coils if len(_shares(pulses, c)) > 1},
         {c: _mean(_shares(pulses, c)) for c in can.coils}, _bridges(pulses, can), rows, table("expected"), table("coils"), read,
-        {row: {a: _half(some, a) for a in can.axes} for row, some in of.items()},
+        {row: {a: half(some, a) for a in can.axes} for row, some in of.items()},
         {name: _pushed(tour) for name, tour in tours.items()},
         {name: _mean([p.phi for p in pulses if p.system == name]) for name in can.systems},
     )  # fmt: skip
@@ -102,8 +113,8 @@ def _bridges(pulses: Sequence[Pulse], can: CoilMap) -> dict[str, tuple[float, fl
             square, product = (np.array([of(p) for p in mine]) for of in (
                 lambda p, c=coil: p.square[c], lambda p, c=coil: p.product_bridge[c]))  # fmt: skip
             share = float(product.sum() / square.sum())
-            left = product - share * square
-            out[coil] = share, float(np.sqrt((left**2).sum() * len(mine) / (len(mine) - 1)) / square.sum())
+            noise = np.array([p.noise[coil] for p in mine])
+            out[coil] = share, float(np.sqrt((square * noise**2).sum()) / square.sum())
     return out
 
 
@@ -113,7 +124,7 @@ def _share(rig: RigFile, coil: str, each: Sequence[float]) -> Estimate:
     return Estimate.of(float(np.mean(each)), scatter) / certified_gain(rig, coil)
 
 
-def _half(pulses: Sequence[Pulse], axis: str) -> float:
+def half(pulses: Sequence[Pulse], axis: str) -> float:
     """Half of what pulses either way moved differently: what creeps by itself is in both."""
     ways = [[p.moved[axis] for p in pulses if (p.size > 0) == up] for up in (True, False)]
     return (_mean(ways[0]) - _mean(ways[1])) / 2
@@ -122,8 +133,7 @@ def _half(pulses: Sequence[Pulse], axis: str) -> float:
 def _pushed(tour: Tour) -> Pushed:
     far = {name: swing(places) for name, places in tour.places.items()}
     most = max(far, key=lambda name: far[name])
-    return Pushed(far, most, fitted(tour.currents, tour.beside, tour.places[most]), tour.places[most],
-                  float(tour.phi.mean()))
+    return Pushed(far, most, fitted(tour.currents, tour.beside, tour.places[most]), tour)
 
 
 def response(r: Result) -> Array:
@@ -148,4 +158,3 @@ def asked(can: CoilMap, rows: Sequence[Row]) -> Array:
         elif way == "q":
             out[i, can.axes.index(system.axes[0])] = 1.0
     return out
-

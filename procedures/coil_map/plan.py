@@ -23,7 +23,9 @@ class Plan(BenchPlan):
     around_A: float = Field(4.5, gt=0, le=5)  # of the push that is turned around: more than weight and pull have beside
     directions: int = Field(32, ge=12)  # of that push
     dwell_s: float = Field(0.02, ge=0.01)  # at each, with a torque current either way
-    beside_A: float = Field(2.0, ge=0, le=5)  # that torque current, along d: it pushes nothing in a winding that is right
+    beside_A: float = Field(
+        2.0, ge=0, le=5
+    )  # that torque current, along d: it pushes nothing in a winding that is right
     rise_steps: int = Field(8, ge=1)  # up to the push, and back
     max_turn_rad: float = Field(0.5, gt=0)  # a mover that went farther than these was pushed too far: the run ends
     max_along_m: float = Field(1.5e-3, gt=0)

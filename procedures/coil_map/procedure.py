@@ -23,7 +23,7 @@ from bench.recording import Recording
 from bench.rigfile import RigFile
 from procedures.coil_map import checks, estimates, figures
 from procedures.coil_map.estimates import Result
-from procedures.coil_map.moving import FAR, moved
+from procedures.coil_map.moving import FAR, moved, settings
 from procedures.coil_map.plan import Plan
 from procedures.coil_map.steps import PULSE, TOUR, points, pulses, radial, read_pulses, read_tours
 from procedures.shared import assumptions
@@ -104,6 +104,7 @@ procedure = Procedure(
     state=RigState.READY,
     plan=Plan,
     acquire=moved,
+    settings=settings,
     evaluate=evaluate,
     measured=measured,
     figures=drawn,

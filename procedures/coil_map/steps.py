@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -27,7 +29,7 @@ STEPPED = 0.2  # of what a pulse should have in its coils, at least
 class Pulse:
     """One pulse of `size` A. By coil: what it should carry, `expected`, what `coils` and `bridges` carry more than before, A,
     in the mean while the current rests; means of the square of what it should carry and of its products with both, A^2. `read`
-    (2,) A: the same of what the controller has of d and q. `moved` by axis, from before to the end; `phi` rad, electrical."""
+    (2,) A: the same of what the controller has of d and q. `noise` A, of the mean of a half-bridge's. `moved` by axis, from before to the end; `phi` rad, electrical."""
 
     system: str
     way: str
@@ -42,17 +44,20 @@ class Pulse:
     product_bridge: Mapping[str, float]
     read: Array
     moved: Mapping[str, float]
+    noise: Mapping[str, float]
 
 
 @dataclass(frozen=True)
 class Tour:
-    """A push that was turned around: `currents` (n, 2) A, the torque current `beside` (n,) A, where the axes of each radial
+    """A push that was turned around: `currents` (n, 2) A, the torque current `beside` (n,) A along d
+    and `beside_q`, as the controller has it, along q, where the axes of each radial
     system were, by its name (n, 2) m; `phi` (n,)
     rad, electrical."""
 
     system: str
     currents: Array
     beside: Array
+    beside_q: Array
     places: Mapping[str, Array]
     phi: Array
 
@@ -89,9 +94,9 @@ def radial(can: CoilMap) -> tuple[str, ...]:
     return tuple(name for name, system in can.systems.items() if system.gives == "radial force")
 
 
-def points(can: CoilMap, name: str, plan: Plan) -> Iterator[tuple[int, float, float, float]]:
+def points(can: CoilMap, name: str, plan: Plan, beside: bool = True) -> Iterator[tuple[int, float, float, float]]:
     """Number, d, q and the torque current beside, A, of a push that is turned around."""
-    sizes = (plan.beside_A, -plan.beside_A) if winding.beside(can, name) and plan.beside_A else (0.0,)
+    sizes = (plan.beside_A, -plan.beside_A) if beside and winding.beside(can, name) and plan.beside_A else (0.0,)
     for k in range(plan.directions):
         at = 2 * np.pi * k / plan.directions
         d, q = plan.around_A * float(np.cos(at)), plan.around_A * float(np.sin(at))
@@ -114,19 +119,22 @@ def read_pulses(recording: Recording[Plan]) -> list[Pulse]:
 
 
 def _pulse(recording: Recording[Plan], step: Step) -> Pulse | None:
-    labels, can, plan = step.labels, ability(recording.rig), recording.plan
-    name, way, size = str(labels["system"]), str(labels["way"]), float(labels["size_A"])
-    system = can.systems[name]
-    found = recording.captures(number=labels["number"])
+    found = recording.captures(number=step.labels["number"])
     if not found:
         return None
-    repeat = int(labels["repeat"])
-    x, rate = found[0].arrays(*captured(can, name, repeat)), found[0].rate_hz
+    names = captured(ability(recording.rig), str(step.labels["system"]), int(step.labels["repeat"]))
+    return pulse_of(recording.rig, recording.plan, step.labels, found[0].arrays(*names), found[0].rate_hz)
+
+
+def pulse_of(rig: RigFile, plan: Plan, labels: Mapping[str, Any], x: Mapping[str, Array], rate: float) -> Pulse | None:
+    """What a capture shows of a pulse; nothing where no current flowed, or where too little of it was captured."""
+    can, name, way = ability(rig), str(labels["system"]), str(labels["way"])
+    system, size, repeat = can.systems[name], float(labels["size_A"]), int(labels["repeat"])
     span = _span(np.array([x[c] for c in system.coils]), abs(size), round(plan.lead_s / 2 * rate), rate, plan)
     if span is None:
         return None
     before, during, end = span
-    phi = winding.phase(recording.rig, system, x[system.angle])
+    phi = winding.phase(rig, system, x[system.angle])
     share = {c: size * e[during] for c, e in winding.of_way(system, way, phi).items()}
 
     def change(channel: str) -> Array:
@@ -144,6 +152,7 @@ def _pulse(recording: Recording[Plan], step: Step) -> Pulse | None:
         {c: float((v * coils[c]).mean()) for c, v in share.items()},
         {c: float((share[c] * v).mean()) for c, v in bridges.items()},
         read, {a: float(x[a][end].mean() - x[a][before].mean()) for a in can.axes},
+        {c: float(v.std()) / math.sqrt(len(v)) for c, v in bridges.items()},
     )  # fmt: skip
 
 
@@ -166,16 +175,23 @@ def read_tours(recording: Recording[Plan]) -> dict[str, Tour]:
     can, plan, out = ability(recording.rig), recording.plan, {}
     for name in radial(can):
         steps = [s for s in recording.steps(TOUR) if s.labels["system"] == name]
-        if len(steps) < sum(1 for _ in points(can, name, plan)):
+        if len(steps) < sum(1 for _ in points(can, name, plan, beside=False)):
             continue
         angle = np.array([s.mean(can.systems[name].angle) for s in steps])
         out[name] = Tour(
             name, np.array([[s.labels["d_A"], s.labels["q_A"]] for s in steps], float),
-            np.array([s.labels["beside_A"] for s in steps], float),
+            np.array([s.labels["beside_A"] for s in steps], float), _beside_q(recording.rig, can, name, steps),
             {n: np.array([[_late(s, a) for a in can.systems[n].axes] for s in steps]) for n in radial(can)},
             winding.phase(recording.rig, can.systems[name], angle),
         )  # fmt: skip
     return out
+
+
+def _beside_q(rig: RigFile, can: CoilMap, name: str, steps: Sequence[Step]) -> Array:
+    """The torque current along q with which the angle was held meanwhile, where telemetry tells it."""
+    other = winding.beside(can, name)
+    channel = can.systems[other].read_q if other else ""
+    return np.array([_late(s, channel) for s in steps]) if channel in rig.channels else np.zeros(len(steps))
 
 
 def _late(step: Step, channel: str) -> float:

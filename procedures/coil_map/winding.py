@@ -45,9 +45,3 @@ def taken_by(system: CoilSystem, coil: str, phi: float, gives: float) -> Array:
     """What a coil that gives a share of its force leaves of the system's pushes, (2, 2)."""
     u = unit(system, coil, phi)
     return np.asarray(np.eye(2) - (1 - gives) * 2 / len(system.coils) * np.outer(u, u))
-
-
-def crossed(system: CoilSystem, other: CoilSystem, coil: str, phi: float, gives: float) -> Array:
-    """What 1 A along d of `other`, which has the same coils, pushes through that coil, (2,)."""
-    share = -(1 - gives) * 2 / len(system.coils) * float(np.cos(phi + other.coils[coil] * DEG))
-    return np.asarray(share * unit(system, coil, phi))
