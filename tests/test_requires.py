@@ -25,7 +25,7 @@ OF = {
     "amb5dof": ("spindown", "step", "bearing-model", "tracking", "unbalance", "compensation", "balance", "run-up", "coast-down",
                 "sensitivity"),
     "amb1dof": ("derivative", "estimator-compare"),
-    "lira": ("loop-response", "mission", "current-step"),
+    "lira": ("loop-response", "mission", "current-step", "coil-map"),
 }  # fmt: skip
 PAIRS = [(rig, name) for rig, names in OF.items() for name in names]
 TABLES = ("channels", "sensors", "parameters", "geometry", "machine")

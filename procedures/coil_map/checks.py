@@ -11,7 +11,7 @@ from bench.findings import Effect, Finding
 from procedures.coil_map import decode, winding
 from procedures.coil_map.estimates import Pushed, Result
 from procedures.coil_map.plan import Plan
-from procedures.coil_map.steps import WAYS, radial
+from procedures.coil_map.steps import WAYS
 
 DEAD = 0.3  # of its share, below which a coil carries nothing
 ELSEWHERE = 0.05  # of a pulse, in a coil that its system does not have
@@ -146,11 +146,12 @@ def _of_push(r: Result, name: str, p: Pushed, plan: Plan) -> Iterator[Finding]:
 def _of_coil(r: Result, name: str, p: Pushed) -> Finding:
     """One coil that gives less force than the others, or the opposite one, if that explains where the mover lay."""
     coil, gives, left, sound = decode.weak_coil(r.can, p.tour, p.places)
-    shown = (f"{name} pushes {p.bowl.roundness:.2f} as hard in one direction as in the other, 1 A of torque current along d pushes "
-             f"like {math.hypot(*p.bowl.m):.2f} A of it, and the mover turned by {math.degrees(p.turned):.0f}° (electrical)")  # fmt: skip
+    shown = (f"{name} pushes {p.bowl.roundness:.2f} as hard in one direction as in the other, 1 A of torque current along d "
+             f"pushes like {math.hypot(*p.bowl.m):.2f} A of it, and the mover turned by {math.degrees(p.turned):.0f}° "
+             "(electrical)")  # fmt: skip
     if left > EXPLAINS * sound:
-        text = (f"{shown}: no single coil explains that well, {coil} best. {CABLE} {coil}, then at those of {_span(r, name)}, and "
-                "whether the mover is free.")  # fmt: skip
+        text = (f"{shown}: no single coil explains that well, {coil} best. {CABLE} {coil}, then at those of {_span(r, name)}, "
+                "and whether the mover is free.")  # fmt: skip
         return _wrong("pushes-unexplained", text, name)
     what = "is connected the other way round" if gives < -0.4 else f"gives some {gives:.0%} of its force"
     text = f"{shown}: coil {coil} {what} (leaves {left * 1e6:.1f} µm, a sound winding {sound * 1e6:.1f} µm). {CABLE} {coil}."
@@ -210,6 +211,8 @@ def coils_unseen(r: Result) -> Iterator[Finding]:
         for coil in system.coils:
             row = winding.taken_by(system, coil, r.phi[name], -1.0)[1]
             if row[1] > 1 - ALONG and abs(row[0]) < ALONG:
-                text = (f"coil {coil} hardly carries any q where the mover lies: whether it is connected the right way round "
-                        "shows in no motion here. Move the mover along by a quarter of a pair of poles and measure again.")  # fmt: skip
+                text = (
+                    f"coil {coil} hardly carries any q where the mover lies: whether it is connected the right way "
+                    "round shows in no motion here. Move it along by a quarter of a pair of poles, measure again."
+                )
                 yield Finding("coil-not-shown", text, coil)

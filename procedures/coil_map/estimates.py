@@ -44,10 +44,10 @@ class Pushed:
 
 @dataclass(frozen=True)
 class Result:
-    """By coil its `share`, and what its own sensor and its half-bridge's read of one (`coils`, `bridges`, the latter
-    with their standard uncertainty). By system and way,
-    of 1 A: what each coil should carry and carried, (rows, coils); what the controller had of it along and across, (rows, 2);
-    `moved` by axis, half of the difference between pulses either way, m or rad. `pushed` by radial system; `phi` by system, electrical, rad."""
+    """By coil its `share`, and what its own sensor and its half-bridge's read of one: `coils`, `bridges`, the latter with their
+    standard uncertainty. By system and way, of 1 A: what each coil should carry and carried, (rows, coils); what the controller
+    had of it along and across, (rows, 2); `moved` by axis, half of the difference between pulses either way, m or rad.
+    `pushed` by radial system; `phi` by system, electrical, rad."""
 
     can: CoilMap
     share: Mapping[str, Estimate]
@@ -105,13 +105,12 @@ def _shares(pulses: Sequence[Pulse], coil: str) -> list[float]:
 
 
 def _bridges(pulses: Sequence[Pulse], can: CoilMap) -> dict[str, tuple[float, float]]:
-    """The same of the half-bridges, where they were captured, and its standard uncertainty: the inner loops make noise there."""
+    """The same of the half-bridges, where they were captured, with its standard uncertainty: inner loops make noise."""
     out = {}
     for coil in can.coils:
         mine = [p for p in pulses if coil in p.bridges]
         if len(mine) > 1:
-            square, product = (np.array([of(p) for p in mine]) for of in (
-                lambda p, c=coil: p.square[c], lambda p, c=coil: p.product_bridge[c]))  # fmt: skip
+            square, product = (np.array([getattr(p, of)[coil] for p in mine]) for of in ("square", "product_bridge"))
             share = float(product.sum() / square.sum())
             noise = np.array([p.noise[coil] for p in mine])
             out[coil] = share, float(np.sqrt((square * noise**2).sum()) / square.sum())

@@ -18,10 +18,13 @@ def all_figures(r: Result) -> Iterator[Figure | Sheet]:
     yield _pair("currents", "Currents of the coils", "Each coil's current of 1 A along d and q of each system, at the angle of "
                 "the pulses: left as the winding gives it, right as it was read.", names, r.can.coils, r.expected, r.found,
                 "current / A")  # fmt: skip
-    yield _pair("moves", "What each system moves", "Left what a right winding moves, right what was seen: pulses around and along "
-                "as a share of the greatest of that axis, aside as a share of the ring. A pulse aside shows as much as the mover "
-                "can roll; which way the bearings push is in the next figures.", names, r.can.axes, asked(r.can, r.rows),
-                response(r), "share")  # fmt: skip
+    caption = (
+        "Left what a right winding moves, right what was seen: pulses around and along as a share of the greatest of that "
+        "axis, aside as a share of the ring. A pulse aside shows as much as the mover can roll; which way the bearings push is in "
+        "the next figures."
+    )
+    wanted = asked(r.can, r.rows)
+    yield _pair("moves", "What each system moves", caption, names, r.can.axes, wanted, response(r), "share")
     for name, p in r.pushed.items():
         yield _around(name, r, p.places)
     yield table(r)
@@ -49,9 +52,11 @@ def _around(name: str, r: Result, places: Array) -> Figure:
     at = np.linspace(0, 2 * np.pi, 90)
     ring = Series("ring, by the fit", 1e6 * (p.bowl.o[0] + p.bowl.c * np.cos(at)), 1e6 * (p.bowl.o[1] + p.bowl.c * np.sin(at)),
                   "guide")  # fmt: skip
-    caption = (f"The mover in its ring while a push of {name} was turned around. Its d stands {np.degrees(p.bowl.angle):+.1f}° from "
-               f"{axes[0]}, it turns {'the other way' if p.bowl.mirrored else 'the same way'} as its current and pushes "
-               f"{p.bowl.roundness:.2f} as hard in its weakest direction.")  # fmt: skip
+    way = "against" if p.bowl.mirrored else "with"
+    caption = (
+        f"The mover in its ring while a push of {name} was turned around. Its d stands {np.degrees(p.bowl.angle):+.1f}° from "
+        f"{axes[0]}, it turns {way} its current, and pushes {p.bowl.roundness:.2f} as hard in its weakest direction."
+    )
     return Figure(f"around-{name}", f"A push of {name}, turned around", caption, f"{axes[0]} / µm", f"{axes[1]} / µm",
                   (turn, first, ring), kind="plane")  # fmt: skip
 
@@ -64,6 +69,8 @@ def table(r: Result) -> Sheet:
         for name, p in r.pushed.items()
     )  # fmt: skip
     header = ("system", "moves", "d stands off by", "mirrored", "least push", "of torque current", "fit")
-    caption = ("Of each bearing current, turned around: which axes it moved most; how far d stands from the first, electrical; its "
-               "least push over its greatest; what 1 A of torque current along d pushes, in A of it; what the fit leaves.")  # fmt: skip
+    caption = (
+        "Of each bearing current, turned around: which axes it moved most; how far d stands from the first, electrical; its "
+        "least push over its greatest; what 1 A of torque current along d pushes, in A of it; what the fit leaves."
+    )
     return Sheet("pushes", "Pushes of the bearing currents", caption, header, rows, (2, 4, 5, 6))

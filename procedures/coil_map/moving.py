@@ -23,8 +23,8 @@ FAR = "far"  # event: the mover went too far, and the run ended there
 
 @contextmanager
 def let_go(rig: Rig, can: CoilMap) -> Iterator[None]:
-    """With no position held by the controller, which `settings` wrote; after it nothing flows, it is off, and its parameters are
-    those of the rig file: off first, for loops that come back would pull a mover that lies elsewhere, and with wrong wiring
+    """With no position held by the controller, which `settings` wrote; after it nothing flows, it is off, and its parameters
+    are those of the rig file: off first, for loops that come back would pull a mover that lies elsewhere, and with wrong wiring
     away."""
     before = {name: rig.file.parameters[name].default for name in settings(rig.file, None)}
     try:

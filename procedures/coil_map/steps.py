@@ -28,8 +28,9 @@ STEPPED = 0.2  # of what a pulse should have in its coils, at least
 @dataclass(frozen=True)
 class Pulse:
     """One pulse of `size` A. By coil: what it should carry, `expected`, what `coils` and `bridges` carry more than before, A,
-    in the mean while the current rests; means of the square of what it should carry and of its products with both, A^2. `read`
-    (2,) A: the same of what the controller has of d and q. `noise` A, of the mean of a half-bridge's. `moved` by axis, from before to the end; `phi` rad, electrical."""
+    in the mean while the current rests; means of the square of what it should carry and of its products with both, A^2;
+    `noise` A, of the mean of a half-bridge's. `read` (2,) A: what the controller has of d and q. `moved` by axis, from before
+    to the end; `phi` rad, electrical."""
 
     system: str
     way: str
@@ -79,7 +80,7 @@ def size_of(system: CoilSystem, plan: Plan) -> float:
 
 
 def pulses(can: CoilMap, plan: Plan) -> Iterator[tuple[str, str, float, int]]:
-    """System, way, A and repeat of every pulse, in their order: those that push nothing aside first, while the mover is calm."""
+    """System, way, A and repeat of every pulse, in order: those that push nothing aside first, while the mover is calm."""
     calm = [name for name, system in can.systems.items() if system.gives != "radial force"]
     rest = [name for name in can.systems if name not in calm]
     for names in (calm, rest):

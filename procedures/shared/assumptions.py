@@ -152,5 +152,5 @@ COIL_MAP = (
     "The readings of the angle and of z are right: a share is of what the winding's table gives at these. 1 degree electrical "
     "moves what a coil is asked for by at most 1.7 % of its system's current, and its share by less than 0.1 %.",
     "Two errors that cancel: a coil connected the other way round whose probe reads with the wrong sign pushes the right way.",
-    "A coil of a linear winding that carries no q where the mover lies: which way round it is connected shows in no motion there.",
+    "A coil of a linear winding that carries no q where the mover lies: which way round it is connected shows in no motion.",
 )

@@ -1,9 +1,9 @@
 """What coils of a winding truly carry of what is asked of them, by the drawn gains of their sensors.
 
-A controller with n coils regulates d and q of its systems by readings: what is common to the coils of a star it leaves free, and
-there the currents add up to nothing. A reading g_k i_k is so the wanted e_k plus what its star has in common, c: with
-sum (e_k + c)/g_k = 0 over the star, c = -sum(e_k/g_k)/sum(1/g_k). A share is sum(i_k e_k)/sum(e_k^2) over d and q of all systems,
-in which sum(e_j e_k) = sum over systems of size^2 cos(p_j - p_k), whatever the angle.
+A controller regulates d and q of its systems by readings: what is common to the coils of a star it leaves free, and there the
+currents add up to nothing. A reading g_k i_k is so the wanted e_k plus what its star has in common, c: with
+sum (e_k + c)/g_k = 0 over the star, c = -sum(e_k/g_k)/sum(1/g_k). A share is sum(i_k e_k)/sum(e_k^2) over d and q of all
+systems, in which sum(e_j e_k) = sum over systems of size^2 cos(p_j - p_k), whatever the angle.
 """
 
 from __future__ import annotations

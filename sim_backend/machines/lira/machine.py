@@ -48,10 +48,10 @@ DEFECTS = {
 `exchange_phases`: b and c of rotary actuator 1 or 2, or of both (3), exchanged at the terminals; `exchange_actuators`: 1, the
 half-bridges of one drive the other; `cables_exchanged`: 100 j + k, coils of two half-bridges j and k exchanged;
 `actuator_reversed`: 1 or 2 rotary, 3 linear, all of its coils the other way round; `coil_dead`: number of a coil that is open;
-`weak_coil`: of one that gives a share `weak_coil_gives` of its force; `zero_off_*` rad electrical: encoder turned or moved after its zero was set; `one_zero`: 1,
-the firmware takes the zero of the first rotary actuator for both; `adc_late_s`: of the half-bridges' readings; `no_pull`: 1,
-the observers do not know the negative stiffness; `position_sign_*`: of a probe; `factor_*`: what the firmware has of
-a gain or a limit that it was told; `capacitance_factor`: of every capacitor, beside what it was drawn with."""
+`weak_coil`: of one that gives a share `weak_coil_gives` of its force; `zero_off_*` rad electrical: encoder turned or moved
+after its zero was set; `one_zero`: 1, the firmware takes the zero of the first rotary actuator for both; `adc_late_s`: of the
+half-bridges' readings; `no_pull`: 1, the observers do not know the negative stiffness; `position_sign_*`: of a probe;
+`factor_*`: what the firmware has of a gain or a limit that it was told; `capacitance_factor`: of every capacitor's own."""
 REVERSED: Final = (range(0), range(1, 7), range(7, 13), range(13, 16))
 """Coils of each actuator, by its number."""
 OPEN_OHM: Final = 5e3
