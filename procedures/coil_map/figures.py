@@ -20,8 +20,8 @@ def all_figures(r: Result) -> Iterator[Figure | Sheet]:
                 "current / A")  # fmt: skip
     caption = (
         "Left what a right winding moves, right what was seen: pulses around and along as a share of the greatest of that "
-        "axis, aside as a share of the ring. A pulse aside shows as much as the mover can roll; which way the bearings push is in "
-        "the next figures."
+        "axis, aside as a share of the ring. A pulse aside shows as much as the mover can roll; which way the bearings push is "
+        "in the next figures."
     )
     wanted = asked(r.can, r.rows)
     yield _pair("moves", "What each system moves", caption, names, r.can.axes, wanted, response(r), "share")

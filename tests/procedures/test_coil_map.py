@@ -14,7 +14,8 @@ from bench.cli.motion_truth import truth_of_motion
 from bench.cli.virtual import Simulated, simulated_run
 from bench.findings import Effect, Finding
 from bench.procedure import Measured
-from bench.rigfile import load_rig
+from bench.rigfile import RigFile, load_rig
+from bench.rigfile.check_capabilities import problems_of
 from bench.uncertainty import interval
 from procedures.coil_map import decode, winding
 from procedures.coil_map.bowl import Bowl, fitted, rest_of
@@ -190,3 +191,23 @@ def test_plans_that_cannot_work_are_refused() -> None:
 
     assert said() == ""
     assert "half of hold_s" in said(rest_s=9e-3)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key", "expected"),
+    [
+        ('read_d = "i_d_R2"', 'read_d = "i_d_R3"', "systems.R2", "a channel of [capture]"),
+        ('axes = ["x2", "y2"]', 'axes = ["x2"]', "systems.B2.axes", "2 of a radial force"),
+        ('zero = "zero.la"\n', 'zero = "zero.lb"\n', "systems.L.zero", "a parameter of this file"),
+        ('q = "step_q_B2"', 'q = "step_q_B1"', "systems.B2", "a parameter of its own"),
+        ('d = "step_d_L"\nq', 'd = "ref_z"\nq', "systems.L", "a parameter in A"),
+        ('"i_s12"], ["i_s13"', '"i_s12"], ["i_s16"', "stars", "a coil of a system"),
+        ("still = { z =", "still = { zz =", "still", "an axis of a system"),
+        ('i_s15 = "i_f15" }', 'i_s15 = "u_s15" }', "bridges", "a channel in A"),
+    ],
+)
+def test_a_table_that_leads_nowhere_is_told(old: str, new: str, key: str, expected: str) -> None:
+    toml, dbc = (Path(f"rigs/lira.{kind}").read_text("utf-8") for kind in ("toml", "dbc"))
+    assert toml.count(old) == 1
+    found = [str(p) for p in problems_of(RigFile.parse(toml.replace(old, new), dbc))]
+    assert any(f"capabilities.coil_map.{key}" in line and expected in line for line in found), found
