@@ -17,7 +17,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import least_squares
 
 Array = npt.NDArray[np.float64]
 CLEAR = (0.6, 1.4)  # the clearance, of half of what the mover's places span
@@ -64,6 +63,8 @@ def swing(places: Array) -> float:
 def fitted(currents: Array, beside: Array, places: Array) -> Bowl:
     """The bowl of a plane by currents (n, 2) A and those beside (n,) A, and by where it lay (n, 2) m; the best of several
     beginnings."""
+    from scipy.optimize import least_squares
+
     middle, size = places.mean(axis=0), max(swing(places) / 2, 1e-9)
     scale = float(np.sqrt((currents**2).sum(axis=1).max()))
     i, b, r = currents / scale, beside[:, None] / scale, (places - middle) / size
@@ -95,6 +96,8 @@ def fitted(currents: Array, beside: Array, places: Array) -> Bowl:
 
 def rest_of(pushes: Array, places: Array) -> float:
     """What is left of places (n, 2) m, root mean square, by pushes (n, 2) A that are known but for what acts beside them."""
+    from scipy.optimize import least_squares
+
     middle, size = places.mean(axis=0), max(swing(places) / 2, 1e-9)
     scale = float(np.sqrt((pushes**2).sum(axis=1).max()))
     i, r = pushes / scale, (places - middle) / size
