@@ -13,7 +13,7 @@ from procedures.coil_map.estimates import Pushed, Result
 from procedures.coil_map.plan import Plan
 from procedures.coil_map.steps import WAYS
 
-DEAD = 0.3  # of its share, below which a coil carries nothing
+DEAD = 0.5  # of its share, below which a coil carries nothing
 ELSEWHERE = 0.05  # of a pulse, in a coil that its system does not have
 APART = 0.03  # by which two sensors of one current may differ, beside so many standard uncertainties
 SURE = 9.0  # noise of a loop is not white: twice 4.5

@@ -16,7 +16,19 @@ from bench.rigfile import RigFile
 from bench.rigfile.capabilities_of_coils import CoilMap
 from procedures.coil_map import checks, estimates, winding
 from procedures.coil_map.plan import Plan
-from procedures.coil_map.steps import PULSE, SLOWER, TOUR, Pulse, ability, captured, points, pulse_of, pulses, radial
+from procedures.coil_map.steps import (
+    PULSE,
+    SLOWER,
+    TOUR,
+    WAYS,
+    Pulse,
+    ability,
+    captured,
+    points,
+    pulse_of,
+    pulses,
+    radial,
+)
 
 FAR = "far"  # event: the mover went too far, and the run ended there
 
@@ -61,7 +73,7 @@ def hold(rig: Rig, can: CoilMap) -> None:
 
 def moved(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Pulses, then pushes turned around, where every current flows as it should; nothing more once the mover is too far from
-    where it lay. Where torques turn the mover as they should it is held against turning meanwhile."""
+    where it lay. Where torques along q turn the mover as they should it is held against turning meanwhile."""
     can = ability(rig.file)
     with let_go(rig, can):
         rig.clock.sleep(plan.settle_s)
@@ -76,19 +88,21 @@ def moved(rig: Rig, plan: Plan, record: Recorder) -> None:
             f.effect is Effect.ERROR for f in checks.of_currents(estimates.evaluate(seen, {}, rig.file), plan)
         ):
             return
-        held = turns_right(can, seen, plan)
-        if held:
+        up, alone = turns_right(can, seen, plan)
+        if up:
             hold(rig, can)
         for name in radial(can):
-            if not _around(rig, plan, record, name, lay, held):
+            if not _around(rig, plan, record, name, lay, up and alone):
                 return
 
 
-def turns_right(can: CoilMap, seen: Sequence[Pulse], plan: Plan) -> bool:
-    """Whether each torque current along q turned the mover up."""
+def turns_right(can: CoilMap, seen: Sequence[Pulse], plan: Plan) -> tuple[bool, bool]:
+    """Whether each torque current along q turned the mover up, and whether none along d turned it as well."""
     torques = [name for name, system in can.systems.items() if system.gives == "torque"]
-    of = {n: [p for p in seen if (p.system, p.way) == (n, "q")] for n in torques}
-    return all(some and estimates.half(some, can.systems[n].axes[0]) > plan.min_turn_rad for n, some in of.items())
+    turned = {(n, way): [p for p in seen if (p.system, p.way) == (n, way)] for n in torques for way in WAYS}
+    by = {key: estimates.half(some, can.systems[key[0]].axes[0]) if some else 0.0 for key, some in turned.items()}
+    up = all(by[n, "q"] > plan.min_turn_rad for n in torques)
+    return up, all(abs(by[n, "d"]) <= checks.ALONG * abs(by[n, "q"]) for n in torques)
 
 
 def _pulse(rig: Rig, plan: Plan, record: Recorder, labels: dict[str, Any]) -> Pulse | None:
@@ -111,15 +125,15 @@ def _pulse(rig: Rig, plan: Plan, record: Recorder, labels: dict[str, Any]) -> Pu
     return pulse_of(rig.file, plan, labels, data.columns, data.rate_hz)
 
 
-def _around(rig: Rig, plan: Plan, record: Recorder, name: str, lay: Mapping[str, float], held: bool) -> bool:
+def _around(rig: Rig, plan: Plan, record: Recorder, name: str, lay: Mapping[str, float], with_torque: bool) -> bool:
     """A push that grows, goes around and is taken back; whether the mover stayed where it may be."""
     can, write = ability(rig.file), rig.levitation.write
-    system, other = can.systems[name], winding.beside(can, name) if held else ""
+    system, other = can.systems[name], winding.beside(can, name) if with_torque else ""
     rises = [plan.around_A * k / plan.rise_steps for k in range(plan.rise_steps + 1)]
     for push in rises:
         write({system.d: push})
         rig.clock.sleep(plan.dwell_s)
-    for number, d, q, beside in points(can, name, plan, held):
+    for number, d, q, beside in points(can, name, plan, with_torque):
         write({system.d: d, system.q: q} | ({can.systems[other].d: beside} if other else {}))
         with record.step(TOUR, system=name, number=number, d_A=d, q_A=q, beside_A=beside):
             rig.clock.sleep(plan.dwell_s)
