@@ -25,7 +25,7 @@ OF = {
     "amb5dof": ("spindown", "step", "bearing-model", "tracking", "unbalance", "compensation", "balance", "run-up", "coast-down",
                 "sensitivity"),
     "amb1dof": ("derivative", "estimator-compare"),
-    "lira": ("loop-response", "unstable-pole", "mission", "actuator-constant", "current-step", "encoder-zero"),
+    "lira": ("loop-response", "unstable-pole", "mission", "actuator-constant", "current-step", "encoder-zero", "coil-map"),
 }  # fmt: skip
 PAIRS = [(rig, name) for rig, names in OF.items() for name in names]
 TABLES = ("channels", "sensors", "parameters", "geometry", "machine")
@@ -84,7 +84,7 @@ def without_capability(rig: RigFile, key: str) -> RigFile:
         holder[last] = ""
         if table == "model":
             del holder[last]
-    elif last in ("path", "injection", "motion", "loop_injection", "hold"):
+    elif last in ("path", "injection", "motion", "loop_injection", "hold", "coil_map"):
         holder[last] = None
     elif key == "set_points" or holder is content or isinstance(holder[last], dict):
         holder[last] = {}

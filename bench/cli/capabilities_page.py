@@ -24,8 +24,8 @@ ROOT = Path(__file__).resolve().parents[2]
 BEGIN = "<!-- made by: python -m bench.cli.capabilities_page docs/reference/rig-file.md -->\n"
 END = "<!-- end -->\n"
 COLUMNS = ("set_points", "path", "injection", "loop_injection", "bias", "settings.law", "settings.compensation", "gains",
-           "flatness", "model", "current_limit", "current_steps", "hold", "force_currents", "angle", "motion", "motor",
-           "status", "mark", "turned", "capture", "masses")  # fmt: skip
+           "flatness", "model", "current_limit", "current_steps", "coil_map", "hold", "force_currents", "encoder_zeros",
+           "angle", "motion", "motor", "status", "mark", "turned", "capture", "masses")  # fmt: skip
 NOTE = """\
 
 `turned` is a motor or a drive in the role `rotation` or `drive`, `masses` are certified ones to hang, `capture` is the

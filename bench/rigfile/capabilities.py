@@ -12,6 +12,7 @@ from typing import Any, Literal
 from pydantic import Field, model_validator
 
 from bench.rigfile.bit import Bit
+from bench.rigfile.capabilities_of_coils import CoilMap
 from bench.rigfile.capabilities_of_loops import CurrentStep, EncoderZero, ForceCurrent, Hold, LoopInjection, Motion
 from bench.rigfile.elements import Name
 from bench.rigfile.part import Part
@@ -154,6 +155,7 @@ class Capabilities(Part):
     current_steps: Mapping[Name, CurrentStep] = {}
     force_currents: Mapping[Name, ForceCurrent] = {}
     encoder_zeros: Mapping[Name, EncoderZero] = {}
+    coil_map: CoilMap | None = None
     model: Mapping[Name, str] = {}
     landing_speed: str = ""
     lift_time: str = ""
@@ -219,6 +221,8 @@ def _tables(c: Capabilities) -> Iterator[tuple[str, str | Mapping[str, str]]]:
     yield "force_currents", {name: one.added for name, one in c.force_currents.items() if one.added}
     for motor, one in c.encoder_zeros.items():
         yield f"encoder_zeros.{motor}", {k: v for k in ZERO_PARAMETERS if (v := getattr(one, k))}
+    if c.coil_map is not None:
+        yield from _of_coils(c.coil_map)
     yield "model", c.model
     for key in ("landing_speed", "lift_time", "watchdog", "current_limit"):
         yield key, getattr(c, key)
@@ -228,6 +232,13 @@ def _of_loops(can: LoopInjection) -> Iterator[tuple[str, str | Mapping[str, str]
     yield from ((f"loop_injection.{key}", getattr(can, key)) for key in ("axis", "place", "amplitude", "hz"))
     for name, one in can.loops.items():
         yield from ((f"loop_injection.loops.{name}.{key}", getattr(one, key)) for key in ("kp", "ki", "kd", "limit"))
+
+
+def _of_coils(found: CoilMap) -> Iterator[tuple[str, str | Mapping[str, str]]]:
+    for name, system in found.systems.items():
+        yield from ((f"coil_map.systems.{name}.{key}", getattr(system, key)) for key in ("d", "q", "zero"))
+    for axis, values in found.still.items():
+        yield f"coil_map.still.{axis}", {name: name for name in values}
 
 
 def is_bound(c: Capabilities, key: str) -> bool:

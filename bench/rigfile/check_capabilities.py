@@ -8,6 +8,7 @@ from bench import units
 from bench.errors import Problem
 from bench.rigfile.bit import Bit
 from bench.rigfile.capabilities import parameters_named
+from bench.rigfile.check_coil_map import problems_of as problems_of_coil_map
 from bench.rigfile.check_current_steps import near
 from bench.rigfile.check_current_steps import problems_of as problems_of_current_steps
 from bench.rigfile.check_encoder_zeros import problems_of as problems_of_encoder_zeros
@@ -36,6 +37,7 @@ def problems_of(rig: RigFile) -> Iterator[Problem]:
         *problems_of_hold(rig),
         *problems_of_force_currents(rig),
         *problems_of_encoder_zeros(rig),
+        *problems_of_coil_map(rig),
     ):
         yield Problem(rig.path, f"capabilities.{key}", found, expected)
 

@@ -166,3 +166,9 @@ ENCODER_ZERO = (
     "Of an actuator of 83.5 N/A 0.1 N for each ampere is 0.07° electrical.",
     "A reference frame of the captured currents that is not the one in which the controller regulates them.",
 )
+COIL_MAP = (
+    "The readings of the angle and of z are right: a share is of what the winding's table gives at these. 1 degree electrical "
+    "moves what a coil is asked for by at most 1.7 % of its system's current, and its share by less than 0.1 %.",
+    "Two errors that cancel: a coil connected the other way round whose probe reads with the wrong sign pushes the right way.",
+    "A coil of a linear winding that carries no q where the mover lies: which way round it is connected shows in no motion.",
+)

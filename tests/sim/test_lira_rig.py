@@ -186,7 +186,9 @@ def test_what_the_engine_plants_is_there() -> None:
     ("planted", "field"),
     [({"coil_reversed": 4.0}, "turned"), ({"exchange_phases": 1.0}, "terminal"), ({"exchange_actuators": 1.0}, "terminal"),
      ({"zero_off_ra": 0.2}, "zero_ra"), ({"zero_off_la": 0.2}, "zero_la"), ({"adc_late_s": 1e-7}, "late"),
-     ({"position_sign_x1": -1.0}, "position_gain"), ({"position_sign_y1": -1.0}, "position_gain")],
+     ({"position_sign_x1": -1.0}, "position_gain"), ({"position_sign_y1": -1.0}, "position_gain"),
+     ({"cables_exchanged": 203.0}, "terminal"), ({"actuator_reversed": 2.0}, "turned"), ({"coil_dead": 5.0}, "coil_r"),
+     ({"weak_coil": 4.0, "weak_coil_gives": 0.5}, "strength")],
 )  # fmt: skip
 def test_defects_reach_the_plant(planted: dict[str, float], field: str) -> None:
     assert changed(built().plant, built(**planted).plant) == field
@@ -200,9 +202,26 @@ def test_wiring_by_hand() -> None:
     assert both.terminal == (6, 7, 8, 9, 10, 11, 0, 1, 2, 3, 4, 5, 12, 13, 14)
     assert both.turned.index(1.0) == 1
     assert sum(built(coil_reversed=15).plant.turned) == 1
+    assert built(cables_exchanged=209).plant.terminal[:9] == (0, 8, 2, 3, 4, 5, 6, 7, 1)
+    assert [k + 1 for k, t in enumerate(built(actuator_reversed=3).plant.turned) if t] == [13, 14, 15]
+    assert built(coil_dead=14).plant.coil_r[13] == 5000.0
+    assert (
+        built(weak_coil=2, weak_coil_gives=0.3, exchange_phases=1).plant.strength[5] == 0.3
+    )  # wherever it is connected
 
 
-@pytest.mark.parametrize("planted", ["coil_reversed", "exchange_phases", "exchange_actuators", "adc_late_s"])
+@pytest.mark.parametrize(
+    "planted",
+    [
+        "coil_reversed",
+        "exchange_phases",
+        "exchange_actuators",
+        "cables_exchanged",
+        "coil_dead",
+        "weak_coil",
+        "adc_late_s",
+    ],
+)
 def test_the_reduced_model_says_what_it_does_not_have(planted: str) -> None:
     with pytest.raises(ConfigError, match=f"simulation.reduced: found 1 with {planted}; expected 0"):
         built(reduced=1, **{planted: 1.0})

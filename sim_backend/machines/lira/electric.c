@@ -112,7 +112,7 @@ void lira_step_stars(const lira_params *p, lira_state *st, const lira_place *at)
             in[6 + a] = st->damper[k];
             in[9 + a] = st->coil[k];
             in[12 + a] = st->sent[k];
-            in[15 + a] = p->emf * (p->turned[k] != 0 ? -1 : 1) * e[STAR[g][a]];
+            in[15 + a] = p->emf * p->strength[k] * (p->turned[k] != 0 ? -1 : 1) * e[STAR[g][a]];
         }
         for (int j = 0; j < N; j++)
             for (int i = 0; i < 12; i++) out[i] += st->star[g][j * 12 + i] * in[j];

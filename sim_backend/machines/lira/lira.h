@@ -26,6 +26,7 @@ typedef struct {
     double coil_gain[15], coil_offset[15], coil_noise, coil_lsb;           /* of i_s */
     double voltage_gain[15], voltage_noise, voltage_lsb, ripple, late;     /* of u_s; V; s */
     double terminal[15], turned[15]; /* which coil a half-bridge drives; 1: the other way round */
+    double strength[15]; /* share of its turns that this coil has, by half-bridge */
     double locked;                   /* the mover is clamped */
     double lag_rate, lag_damping;    /* of the current loops in the reduced model, rad/s and 1 */
 } lira_params;

@@ -31,7 +31,7 @@ void lira_coils(const double *dq, double cos_phase, double sin_phase, double *co
 /* dq currents in the true frames, coil by coil as they are wired */
 static void true_currents(const lira_params *p, const lira_state *st, const lira_place *at, double *dq) {
     double coil[BRIDGES];
-    for (int k = 0; k < BRIDGES; k++) coil[(int)p->terminal[k]] = p->turned[k] != 0 ? -st->coil[k] : st->coil[k];
+    for (int k = 0; k < BRIDGES; k++) coil[(int)p->terminal[k]] = p->strength[k] * (p->turned[k] != 0 ? -st->coil[k] : st->coil[k]);
     split_all(coil, at->ra, at->la, dq);
 }
 

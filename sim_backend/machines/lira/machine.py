@@ -42,22 +42,33 @@ DEFECTS = {
     "drop_fraction": 0.0, "dead_after_s": 0.0, "fault_after_s": 0.0, "drive_fault_after_s": 0.0, "integrator_factor": 1.0,
     "coil_reversed": 0.0, "exchange_phases": 0.0, "exchange_actuators": 0.0, "zero_off_ra": 0.0, "zero_off_la": 0.0,
     "one_zero": 0.0, "adc_late_s": 0.0, "no_pull": 0.0, "position_sign_x1": 1.0, "position_sign_y1": 1.0,
+    "cables_exchanged": 0.0, "actuator_reversed": 0.0, "coil_dead": 0.0, "weak_coil": 0.0, "weak_coil_gives": 1.0,
     "factor_kp_s": 1.0, "factor_kp_sl": 1.0, "factor_kp_v": 1.0, "factor_current_max": 1.0, "capacitance_factor": 1.0,
     "hold_one_plane": 0.0, "hold_deaf": 0.0,
     "factor_ki_r": 1.0, "factor_ki_z": 1.0,
 }  # fmt: skip
 """Planted defects and their harmless values. `coil_reversed`: number of the coil that is connected the other way round;
 `exchange_phases`: b and c of rotary actuator 1 or 2, or of both (3), exchanged at the terminals; `exchange_actuators`: 1, the
-half-bridges of one drive the other; `zero_off_*` rad electrical: encoder turned or moved after its zero was set; `one_zero`: 1,
-the firmware takes the zero of the first rotary actuator for both; `adc_late_s`: of the half-bridges' readings; `no_pull`: 1,
-the observers do not know the negative stiffness; `position_sign_*`: of a probe; `factor_*`: what the firmware has of
-a gain or a limit that it was told; `capacitance_factor`: of every capacitor, beside what it was drawn with; `hold_one_plane`:
-1, a hold pushes the first plane alone; `hold_deaf`: 1, a hold is answered and does not come."""
+half-bridges of one drive the other; `cables_exchanged`: 100 j + k, coils of two half-bridges j and k exchanged;
+`actuator_reversed`: 1 or 2 rotary, 3 linear, all of its coils the other way round; `coil_dead`: number of a coil that is open;
+`weak_coil`: of one that gives a share `weak_coil_gives` of its force; `zero_off_*` rad electrical: encoder turned or moved
+after its zero was set; `one_zero`: 1, the firmware takes the zero of the first rotary actuator for both; `adc_late_s`: of the
+half-bridges' readings; `no_pull`: 1, the observers do not know the negative stiffness; `position_sign_*`: of a probe;
+`factor_*`: what the firmware has of a gain or a limit that it was told; `capacitance_factor`: of every capacitor's own;
+`hold_one_plane`: 1, a hold pushes the first plane alone; `hold_deaf`: 1, a hold is answered and does not come."""
+REVERSED: Final = (range(0), range(1, 7), range(7, 13), range(13, 16))
+"""Coils of each actuator, by its number."""
+OPEN_OHM: Final = 5e3
+"""Of a coil that is open: 40 mA at the whole supply."""
 FACTORS: Final = ("kp_s", "kp_sl", "kp_v", "current_max", "ki_r", "ki_z")
 ELECTRICAL: Final = (
     "coil_reversed",
     "exchange_phases",
     "exchange_actuators",
+    "cables_exchanged",
+    "actuator_reversed",
+    "coil_dead",
+    "weak_coil",
     "adc_late_s",
     "factor_kp_s",
     "factor_kp_sl",
@@ -182,8 +193,9 @@ def _coils(v: Numbers, name: str, spread: str) -> Each:
 def _wound(v: Numbers, d: Numbers) -> dict[str, Any]:
     """Coils, and filters of the half-bridges."""
     farad = v["filter_capacitance"] * d["capacitance_factor"]
+    ohm = _coils(v, "coil_resistance", "coil_resistance_spread")
     return {
-        "coil_r": _coils(v, "coil_resistance", "coil_resistance_spread"),
+        "coil_r": tuple(OPEN_OHM if k == int(d["coil_dead"]) else r for k, r in zip(HALVES, ohm, strict=True)),
         "coil_l": _coils(v, "machine.inductance", "coil_inductance_spread"),
         "filter_l": _each(v, "filter_inductance"),
         "filter_c": tuple(farad * share for share in _each(v, "capacitor_derating_filter")),
@@ -222,9 +234,15 @@ def _wired(d: Numbers) -> dict[str, Any]:
                 order[first + one], order[first + other] = order[first + other], order[first + one]
     if d["exchange_actuators"]:
         order[:12] = order[6:12] + order[:6]
+    if d["cables_exchanged"]:
+        one, other = (k - 1 for k in divmod(int(d["cables_exchanged"]), 100))
+        order[one], order[other] = order[other], order[one]
+    coils = [k + 1 for k in order]
+    reversed_ = {int(d["coil_reversed"]), *REVERSED[int(d["actuator_reversed"])]}
     return {
         "terminal": tuple(map(float, order)),
-        "turned": tuple(float(order[k - 1] + 1 == int(d["coil_reversed"])) for k in HALVES),
+        "turned": tuple(float(k in reversed_) for k in coils),
+        "strength": tuple(d["weak_coil_gives"] if k == int(d["weak_coil"]) else 1.0 for k in coils),
     }
 
 

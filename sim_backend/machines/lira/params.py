@@ -85,6 +85,7 @@ class PlantParams:
     late: float = 0.0  # s
     terminal: Each = (0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0)
     turned: Each = (0.0,) * COILS
+    strength: Each = (1.0,) * COILS
     locked: float = 0.0
     lag_rate: float = 2.1e4
     lag_damping: float = 0.9
