@@ -16,7 +16,8 @@ from bench.errors import ConfigError
 from bench.rigfile import RigFile, load_rig
 from sim_backend.endpoint import SimulatedRig
 from sim_backend.machine import Truth
-from sim_backend.machines.lira.machine import DEFECTS, LIRA, Built
+from sim_backend.machines.lira.defects import DEFECTS
+from sim_backend.machines.lira.machine import LIRA, Built
 from sim_backend.machines.lira.params import ControlParams, PlantParams
 from sim_backend.machines.lira.plant import TRACE, Plant, ideal
 from sim_backend.truth import draw, nominal
