@@ -35,6 +35,8 @@ def test_the_rig_is_sound() -> None:
         ({"added": "ref_z"}, "force_currents.LA.added", "in A"),
         ({"period": "machine/pitch"}, "force_currents.LA.period", "the place of a number"),
         ({"period": "machine/mass"}, "force_currents.LA.period", "a length"),
+        ({"along": "L_x"}, "force_currents.LA.along", "current_steps"),
+        ({"zero": "kp.z"}, "force_currents.LA.zero", "in rad"),
     ],
 )
 def test_what_leads_nowhere(changes: dict[str, Any], key: str, expected: str) -> None:
@@ -45,15 +47,15 @@ def test_what_leads_nowhere(changes: dict[str, Any], key: str, expected: str) ->
 
 
 def test_a_zero_is_an_angle() -> None:
-    zero = RIG.capabilities.force_currents["LA"].zero.model_copy(update={"unit": "m"})
-    assert [k for k, _, _ in problems_of(bound(zero=zero))] == ["force_currents.LA.zero"]
+    stated = RIG.capabilities.force_currents["LA"].stated.model_copy(update={"unit": "m"})
+    assert [k for k, _, _ in problems_of(bound(stated=stated))] == ["force_currents.LA.stated"]
 
 
 def test_zeros_and_pitch_are_what_the_simulation_draws() -> None:
     """A budget with another tolerance than the drawn machine's would be too wide or too narrow."""
     drawn = {"LA": "zero_la", "RA1": "zero_ra1", "RA2": "zero_ra2"}
     for motor, name in drawn.items():
-        zero, told = RIG.capabilities.force_currents[motor].zero, RIG.simulation[name]
+        zero, told = RIG.capabilities.force_currents[motor].stated, RIG.simulation[name]
         assert zero.unit == "rad"
         assert (zero.value, zero.half_width, zero.distribution) == (told.value, told.half_width, told.distribution)
         assert zero.half_width is not None

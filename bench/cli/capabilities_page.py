@@ -24,7 +24,7 @@ ROOT = Path(__file__).resolve().parents[2]
 BEGIN = "<!-- made by: python -m bench.cli.capabilities_page docs/reference/rig-file.md -->\n"
 END = "<!-- end -->\n"
 COLUMNS = ("set_points", "path", "injection", "loop_injection", "bias", "settings.law", "settings.compensation", "gains",
-           "flatness", "model", "current_limit", "current_steps", "coil_map", "hold", "force_currents", "encoder_zeros",
+           "flatness", "model", "current_limit", "current_steps", "coil_map", "hold", "force_currents",
            "angle", "motion", "motor", "status", "mark", "turned", "capture", "masses")  # fmt: skip
 NOTE = """\
 

@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 
 from bench.rigfile.bit import Bit
 from bench.rigfile.capabilities_of_coils import CoilMap
-from bench.rigfile.capabilities_of_loops import CurrentStep, EncoderZero, ForceCurrent, Hold, LoopInjection, Motion
+from bench.rigfile.capabilities_of_loops import CurrentStep, ForceCurrent, Hold, LoopInjection, Motion
 from bench.rigfile.elements import Name
 from bench.rigfile.part import Part
 from bench.rigfile.toleranced import Toleranced
@@ -154,7 +154,6 @@ class Capabilities(Part):
     status: Status = Status()
     current_steps: Mapping[Name, CurrentStep] = {}
     force_currents: Mapping[Name, ForceCurrent] = {}
-    encoder_zeros: Mapping[Name, EncoderZero] = {}
     coil_map: CoilMap | None = None
     model: Mapping[Name, str] = {}
     landing_speed: str = ""
@@ -180,7 +179,7 @@ MOVED = ("place", "place_rate", "place_rise", "angle", "angle_rate", "angle_rise
 HELD = ("begin", "across", "push", "bound", "limit")
 """Those of a hold."""
 STEP_PARAMETERS = ("parameter", "gain", "current_limit")
-ZERO_PARAMETERS = ("across", "zero")
+FORCE_PARAMETERS = ("added", "zero")
 
 
 def parameters_named(c: Capabilities) -> Iterator[tuple[str, str]]:
@@ -218,9 +217,8 @@ def _tables(c: Capabilities) -> Iterator[tuple[str, str | Mapping[str, str]]]:
         yield from ((f"flatness.{law}.{key}", value) for key, value in flat)
     for place, step in c.current_steps.items():
         yield f"current_steps.{place}", {k: v for k in STEP_PARAMETERS if (v := getattr(step, k))}
-    yield "force_currents", {name: one.added for name, one in c.force_currents.items() if one.added}
-    for motor, one in c.encoder_zeros.items():
-        yield f"encoder_zeros.{motor}", {k: v for k in ZERO_PARAMETERS if (v := getattr(one, k))}
+    for motor, one in c.force_currents.items():
+        yield f"force_currents.{motor}", {k: v for k in FORCE_PARAMETERS if (v := getattr(one, k))}
     if c.coil_map is not None:
         yield from _of_coils(c.coil_map)
     yield "model", c.model

@@ -134,28 +134,17 @@ class CurrentStep(Part):
 
 
 class ForceCurrent(Part):
-    """The current by which a motor gives force along a loop of `loop_injection`, or torque around: `current` is the channel
-    that reads it, of telemetry and of captures alike; `added`, A, the parameter that is added to its reference. `period` is the
+    """The current by which a motor gives force along a loop of `loop_injection`, or torque around; motors of one loop share
+    what it asks for. `current` is the channel that reads it, of telemetry and of captures alike; `added`, A, the parameter that
+    is added to its reference; `along`, the step of `current_steps` that goes along the field and gives none. `period` is the
     place in this file of a number that says how the current's phase goes with the loop's coordinate: a length has a turn of it,
-    a count so many turns of it a turn. `zero`: the encoder's zero against that phase, electrical, as it was set."""
+    a count so many turns of it a turn. `zero`, the parameter that the controller takes for the encoder's zero against that
+    phase, rad electrical: the field's phase is the reading's less it. `stated`: what that zero is said to be."""
 
     loop: str
     current: str
     added: str = ""
-    period: str = ""
-    zero: Toleranced
-
-
-class EncoderZero(Part):
-    """Where the field of a motor lies against its encoder, as the controller lays the motor's currents: `step`, that of
-    `current_steps` which goes along the field; `across`, A, the parameter of one across it, which gives force; `loop`, that of
-    `loop_injection.loops` which holds what the motor moves: motors of one loop share what it asks for. `period` m or rad of
-    that loop's channel in an electrical turn. `zero`, the parameter that the controller takes for it, rad electrical, as the
-    reading counts: the field's phase is the reading's less it. `stated`: what the zero is said to be."""
-
-    step: str
-    across: str = ""
-    loop: str
-    period: Toleranced
-    zero: str
-    stated: Toleranced | None = None
+    along: str = ""
+    period: str
+    zero: str = ""
+    stated: Toleranced

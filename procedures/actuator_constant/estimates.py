@@ -19,6 +19,7 @@ from procedures.actuator_constant.sines import Place, around, loops, motors, pla
 from procedures.actuator_constant.steps import Added, Array, Taken
 from procedures.position_loops.injection import ability
 from procedures.position_loops.lines import counted
+from procedures.position_loops.motors import phase_rate
 from procedures.shared.certificates import certified, certified_gain
 
 Found = dict[tuple[str, str], Estimate]
@@ -149,10 +150,10 @@ def _gain(rig: RigFile, motor: str, weights: Array) -> Estimate:
 
 def cosine(rig: RigFile, motor: str) -> Estimate:
     """1/cos of the encoder's zero, which nothing here shows: its mean and spread over the tolerance, to the second order."""
-    zero = rig.capabilities.force_currents[motor].zero
+    zero = rig.capabilities.force_currents[motor].stated
     v, u = zero.value, zero.standard_uncertainty
     fourth = u**4 * (0.5 if zero.distribution == "normal" else 0.2)  # variance of the square's half
-    spread = Influence(f"capabilities/force_currents/{motor}/zero", f"zero of the encoder, {motor}: its cosine",
+    spread = Influence(f"capabilities/force_currents/{motor}/stated", f"zero of the encoder, {motor}: its cosine",
                        math.sqrt((v * u) ** 2 + fourth), "1", "B", "normal", source=zero.source)  # fmt: skip
     return Estimate.of(1 + (v * v + u * u) / 2, spread)
 
@@ -207,9 +208,3 @@ def _offset(rig: RigFile, motor: str, weights: Array) -> float:
     across = 1 - weights * len(coils) / 2
     u = np.array([rig.sensors[c].offset.standard_uncertainty for c in coils])
     return 2 / len(coils) * math.sqrt(max(float(across @ u**2), 0.0))
-
-
-def phase_rate(rig: RigFile, motor: str) -> float:
-    """How fast the phase of a motor's current goes with the loop's coordinate, rad a unit."""
-    number = Places(rig).known[rig.capabilities.force_currents[motor].period]
-    return 2 * math.pi / number.value if number.unit == "m" else number.value

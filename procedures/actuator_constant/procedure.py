@@ -39,6 +39,7 @@ from procedures.actuator_constant.sines import (
 )
 from procedures.actuator_constant.steps import ADDED, SINE, STATE, channels, read_added, read_taken
 from procedures.position_loops.injection import BELOW, REFERENCE, ability, injected, parameters_of
+from procedures.position_loops.motors import periods_of
 from procedures.shared import assumptions
 from procedures.shared.rates import of_rate
 
@@ -205,6 +206,8 @@ def requires(rig: RigFile) -> Requires:
     return Requires(
         channels=(*shown, *currents, STATE),
         sensors=coils,
+        machine=periods_of(rig, "machine", driving),
+        geometry=periods_of(rig, "geometry", driving),
         capabilities=wanted,
         capture=(*shown, *currents, *coils, *([can.wave] if can.wave else [])),
         lacks=tuple(_lacks(rig)),

@@ -11,9 +11,10 @@ from bench.findings import Effect, Finding
 from bench.rigfile import RigFile
 from bench.uncertainty import interval
 from procedures.encoder_zero.estimates import Result, differences, shifts
-from procedures.encoder_zero.groups import PLACES, Group, electrical, groups, settle_s, zeros
+from procedures.encoder_zero.groups import PLACES, Group, groups, settle_s, zeros
 from procedures.encoder_zero.plan import Plan
 from procedures.encoder_zero.steps import Answers, Taken, answers, column
+from procedures.position_loops.motors import phase_rate
 from procedures.shared import signals
 
 HELD = "LEVITATED"
@@ -57,7 +58,7 @@ def names(group: Group) -> tuple[str, ...]:
     """What a group's currents tell."""
     return (
         *(f"zero@{m}" for m in group.motors),
-        *(f"constant_ratio@{m}/{group.motors[-1]}" for m in group.motors[:-1]),
+        *(f"K_ratio@{m}/{group.motors[-1]}" for m in group.motors[:-1]),
     )
 
 
@@ -80,7 +81,7 @@ def _of_answers(found: Answers, rig: RigFile, plan: Plan) -> Iterator[Finding]:
                     "the controller steps.")  # fmt: skip
             yield Finding("current-wrong", text, where, Effect.ERROR)
             return
-        moved = abs(mean[e, 0]) * electrical(rig, motor)
+        moved = abs(mean[e, 0]) * phase_rate(rig, motor)
         if moved > plan.max_moved_rad:
             text = (f"the mover stood {2 * moved * DEG:.3g}° electrical apart under both signs, "
                     f"{2 * plan.max_moved_rad * DEG:.3g}° allowed: cogging is "
@@ -154,7 +155,7 @@ def _trials(found: Result, plan: Plan) -> Iterator[Finding]:
 
 def _off(found: Result, motor: str, rig: RigFile) -> Iterator[Finding]:
     stated, zero = zeros(rig)[motor].stated, interval(found.estimates["zero", motor])
-    if stated is None or stated.half_width is None:
+    if stated.half_width is None:
         return
     low, high = stated.value - stated.half_width, stated.value + stated.half_width
     if zero.low > high or zero.high < low:

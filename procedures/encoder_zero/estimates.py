@@ -13,10 +13,11 @@ from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
 from procedures.encoder_zero import fit
 from procedures.encoder_zero.fit import Field
-from procedures.encoder_zero.groups import PLACES, Group, electrical, groups, loop_of, settle_s, slowest_s, zeros
+from procedures.encoder_zero.groups import PLACES, Group, groups, loop_of, settle_s, slowest_s, zeros
 from procedures.encoder_zero.plan import Plan
 from procedures.encoder_zero.steps import Answers, Taken, answers
-from procedures.shared.certificates import certified, certified_gain
+from procedures.position_loops.motors import electrical_turn, phase_rate
+from procedures.shared.certificates import certified_gain
 
 Array = npt.NDArray[np.float64]
 RAD = "rad"
@@ -87,7 +88,7 @@ def _of_group(group: Group, places: Sequence[At], trials: Mapping[str, At], rig:
         out["zero", motor] = mean + Estimate.of(0.0, scatter) + Estimate.of(0.0, unsettled)
         apart[motor] = each[0] - each[1] + Estimate.of(0.0, scatter) * 2.0
     for one in group.motors[:-1]:
-        out["constant_ratio", f"{one}/{group.motors[-1]}"] = _ratio(group, one, places, rig)
+        out["K_ratio", f"{one}/{group.motors[-1]}"] = _ratio(group, one, places, rig)
     return Result(group, places, trials, out, apart, turns)
 
 
@@ -97,14 +98,14 @@ def _zero(motor: str, place: At, angle: float, rig: RigFile) -> Estimate:
     one, reading = zeros(rig)[motor], place.answers.reading
     channel = loop_of(rig, place.answers.group.loop).channel
     true = reading / certified_gain(rig, channel) if channel in rig.sensors else Estimate.exact(reading)
-    period = certified(f"capabilities/encoder_zeros/{motor}/period", one.period, f"electrical turn of {motor}")
+    period = electrical_turn(rig, motor)
     known = rig.parameters[one.zero].default
-    phase = electrical(rig, motor) * reading
+    phase = phase_rate(rig, motor) * reading
     field_phase = 2 * math.pi * true / period
     out = Estimate(field_phase.value, RAD, field_phase.sensitivities) + (angle + known - phase)
     for name, slope in zip(rig.motors[motor].currents, _gains(rig, motor, angle, phase - known)[0], strict=True):
         out = out + slope * (_gain(rig, name) - 1)
-    rounded = Estimate(0.0, RAD, {_rounding(place, rig): electrical(rig, motor)})
+    rounded = Estimate(0.0, RAD, {_rounding(place, rig): phase_rate(rig, motor)})
     return out + rounded
 
 
@@ -149,7 +150,7 @@ def _ratio(group: Group, one: str, places: Sequence[At], rig: RigFile) -> Estima
     for k, sign in ((j, 1.0), (last, -1.0)):
         motor = group.motors[k]
         known = rig.parameters[zeros(rig)[motor].zero].default
-        slopes = np.mean([_gains(rig, motor, float(p.field.angle[k]), electrical(rig, motor) * p.answers.reading - known)[1]
+        slopes = np.mean([_gains(rig, motor, float(p.field.angle[k]), phase_rate(rig, motor) * p.answers.reading - known)[1]
                           for p in places], axis=0)  # fmt: skip
         for name, slope in zip(rig.motors[motor].currents, slopes, strict=True):
             out = out + value * sign * float(slope) * (certified_gain(rig, name) - 1)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -10,8 +9,9 @@ import numpy as np
 
 from bench.errors import Lacking
 from bench.rigfile import RigFile
-from bench.rigfile.capabilities_of_loops import CurrentStep, EncoderZero, InjectedLoop
+from bench.rigfile.capabilities_of_loops import CurrentStep, ForceCurrent, InjectedLoop
 from procedures.encoder_zero.plan import Plan
+from procedures.position_loops.motors import electrical_turn
 from procedures.shared.rates import rate_of
 
 USUAL_HZ = 35e3
@@ -48,14 +48,14 @@ class Setting:
     sign: int
 
 
-def zeros(rig: RigFile) -> dict[str, EncoderZero]:
-    """By motor."""
-    return dict(rig.capabilities.encoder_zeros)
+def zeros(rig: RigFile) -> dict[str, ForceCurrent]:
+    """By motor, those whose zero the controller keeps and whose current along the field it steps."""
+    return {name: one for name, one in rig.capabilities.force_currents.items() if one.along and one.zero}
 
 
 def step_of(rig: RigFile, motor: str) -> CurrentStep:
     """The current along the field of a motor."""
-    return rig.capabilities.current_steps[zeros(rig)[motor].step]
+    return rig.capabilities.current_steps[zeros(rig)[motor].along]
 
 
 def loop_of(rig: RigFile, loop: str) -> InjectedLoop:
@@ -80,7 +80,7 @@ def groups(rig: RigFile, plan: Plan | None = None) -> tuple[Group, ...]:
 
 def parameter_of(rig: RigFile, motor: str, way: str) -> str:
     """What steps a current."""
-    return step_of(rig, motor).parameter if way == ALONG else zeros(rig)[motor].across
+    return step_of(rig, motor).parameter if way == ALONG else zeros(rig)[motor].added
 
 
 def captured(rig: RigFile, group: Group) -> tuple[str, ...]:
@@ -104,7 +104,7 @@ def set_point(rig: RigFile, loop: str) -> str:
 
 def target(rig: RigFile, group: Group, place: int) -> float:
     """Where the mover is sent, m or rad."""
-    period = zeros(rig)[group.motors[0]].period.value
+    period = electrical_turn(rig, group.motors[0]).value
     return rig.parameters[set_point(rig, group.loop)].default + place * period / (2 * PLACES)
 
 
@@ -147,8 +147,3 @@ def count(rig: RigFile, plan: Plan) -> int:
     of = groups(rig, plan)
     once = sum(2 * len(g.stepped) * PLACES * plan.repeats for g in of)
     return once + (sum(2 * len(g.stepped) * len(g.motors) * TRIAL_REPEATS for g in of) if plan.trial_rad else 0)
-
-
-def electrical(rig: RigFile, motor: str) -> float:
-    """Electrical rad in a metre or radian."""
-    return 2 * math.pi / zeros(rig)[motor].period.value

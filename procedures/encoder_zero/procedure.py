@@ -29,11 +29,12 @@ from procedures.encoder_zero.estimates import Result
 from procedures.encoder_zero.groups import ALONG, PLACES, TRIAL_REPEATS, Group, Setting, parameter_of, settings_of
 from procedures.encoder_zero.plan import Plan
 from procedures.encoder_zero.steps import STATE, STEP, Taken, read_taken
+from procedures.position_loops.motors import periods_of
 from procedures.shared import assumptions
 from procedures.shared.rates import of_rate
 
 ZERO = Quantity("zero", "rad", "electrical angle of the encoder at which the motor's field lies along its first phase")
-RATIO = Quantity("constant_ratio", "1", "force or torque per ampere of the one motor over that of the other")
+RATIO = Quantity("K_ratio", "1", "force or torque per ampere of the one motor over that of the other")
 MEASURES = (ZERO, RATIO)
 MARGIN_S = 1e-3  # of a capture
 NAMED = 3  # motors of one loop, for the progress display
@@ -170,20 +171,22 @@ def figures(results: Results, recording: Recording[Plan]) -> Iterable[Figure]:
 
 def requires(rig: RigFile) -> Requires:
     """By the names that the rig has."""
-    needed = ("encoder_zeros", "loop_injection", "current_steps", "motion")
+    needed = ("force_currents", "loop_injection", "current_steps", "motion")
     can = rig.capabilities
-    if not can.encoder_zeros or can.loop_injection is None or not can.current_steps:
+    if not groups.zeros(rig) or can.loop_injection is None or not can.current_steps:
         return Requires(capabilities=needed, capture=())
     of = groups.groups(rig)
-    across = [(m, groups.zeros(rig)[m].across) for g in of for m, way in g.stepped if way != ALONG]
+    across = [(m, groups.zeros(rig)[m].added) for g in of for m, way in g.stepped if way != ALONG]
     lacks = [
-        f"capabilities.encoder_zeros.{m}.across: found none; its loop drives other motors, too"
+        f"capabilities.force_currents.{m}.added: found none; its loop drives other motors, too"
         for m, p in across
         if not p
     ]
     return Requires(
         channels=(STATE, *(groups.loop_of(rig, g.loop).channel for g in of)),
         sensors=tuple(c for m in groups.zeros(rig) for c in rig.motors[m].currents),
+        machine=periods_of(rig, "machine", groups.zeros(rig)),
+        geometry=periods_of(rig, "geometry", groups.zeros(rig)),
         capabilities=needed,
         capture=tuple(dict.fromkeys(c for g in of for c in groups.captured(rig, g))),
         lacks=tuple(lacks),

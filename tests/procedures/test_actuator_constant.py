@@ -108,7 +108,7 @@ def test_the_ratio_of_two_motors_by_hand() -> None:
 
 
 def test_the_cosine_of_a_zero() -> None:
-    zero = RIG.capabilities.force_currents["RA1"].zero
+    zero = RIG.capabilities.force_currents["RA1"].stated
     assert zero.half_width is not None
     drawn = 1 / np.cos(np.linspace(-1, 1, 20001) * zero.half_width)
     found = estimates.cosine(RIG, "RA1")

@@ -198,7 +198,7 @@ def test_plans_that_cannot_work_are_refused() -> None:
     [
         ('read_d = "i_d_R2"', 'read_d = "i_d_R3"', "systems.R2", "a channel of [capture]"),
         ('axes = ["x2", "y2"]', 'axes = ["x2"]', "systems.B2.axes", "2 of a radial force"),
-        ('zero = "zero.la"\n', 'zero = "zero.lb"\n', "systems.L.zero", "a parameter of this file"),
+        ('zero = "zero.la"\ncoils', 'zero = "zero.lb"\ncoils', "systems.L.zero", "a parameter of this file"),
         ('q = "step_q_B2"', 'q = "step_q_B1"', "systems.B2", "a parameter of its own"),
         ('d = "step_d_L"\nq', 'd = "ref_z"\nq', "systems.L", "a parameter in A"),
         ('"i_s12"], ["i_s13"', '"i_s12"], ["i_s16"', "stars", "a coil of a system"),

@@ -66,7 +66,7 @@ def test_the_rotary_motors(tmp_path: Path) -> None:
     truth = {**REDUCED, "zero_ra1": math.radians(10), "zero_ra2": math.radians(-4)}
     done = run(tmp_path, truth, **ROTARY)
     assert codes(done) == {}
-    assert set(values(done)) == {"zero@RA1", "zero@RA2", "constant_ratio@RA1/RA2"}
+    assert set(values(done)) == {"zero@RA1", "zero@RA2", "K_ratio@RA1/RA2"}
     for name in values(done):
         assert off(done, name) < 2, name
     assert math.degrees(values(done)["zero@RA1"].estimate.u) < 0.01
@@ -202,23 +202,23 @@ def test_refusals() -> None:
     assert list(check(RIG, Plan())) == []
     assert "found LB" in next(iter(check(RIG, Plan(motors=("LB",)))))
     assert "observer" in next(iter(check(RIG, Plan(observer="other"))))
-    assert "step_d_R1" in next(iter(check(RIG, Plan(current_A=6.0))))
+    assert "step_d_L" in next(iter(check(RIG, Plan(current_A=6.0))))
     assert "rate_hz" in next(iter(check(RIG, Plan(rate_hz=123.456e3))))
     assert count(RIG, Plan(repeats=3)) == len(recorded(Plan(repeats=3)))
-    bare = RIG.model_copy(update={"capabilities": RIG.capabilities.model_copy(update={"encoder_zeros": {}})})
-    assert "encoder_zeros" in procedure.lacking(bare)[0]
+    bare = RIG.model_copy(update={"capabilities": RIG.capabilities.model_copy(update={"force_currents": {}})})
+    assert "force_currents" in procedure.lacking(bare)[0]
 
 
 @pytest.mark.parametrize(
     ("old", "new", "key"),
     [
-        ('step = "L_d"', 'step = "L_x"', "encoder_zeros.LA.step"),
-        ('step = "R2_d"', 'step = "R1_d"', "encoder_zeros.RA2.step"),
-        ("[capabilities.encoder_zeros.LA]", "[capabilities.encoder_zeros.LB]", "encoder_zeros.LB"),
-        ('loop = "z"', 'loop = "w"', "encoder_zeros.LA.loop"),
-        ('zero = "zero.la"', 'zero = "kp.z"', "encoder_zeros.LA.zero"),
-        ('zero = "zero.ra2"', 'zero = "zero.ra9"', "encoder_zeros.RA2.zero"),
-        ('period = { value = 12.5, unit = "mm"', 'period = { value = 12.5, unit = "deg"', "encoder_zeros.LA.period"),
+        ('along = "L_d"', 'along = "L_x"', "force_currents.LA.along"),
+        ('along = "R2_d"', 'along = "R1_d"', "force_currents.RA2.along"),
+        ("[capabilities.force_currents.LA]", "[capabilities.force_currents.LB]", "force_currents.LB"),
+        ('loop = "z"', 'loop = "w"', "force_currents.LA.loop"),
+        ('zero = "zero.la"\nstated', 'zero = "kp.z"\nstated', "force_currents.LA.zero"),
+        ('zero = "zero.ra2"\nstated', 'zero = "zero.ra9"\nstated', "force_currents.RA2.zero"),
+        ('period = "machine/pair_pitch"', 'period = "machine/pairs"', "force_currents.LA.period"),
     ],
 )  # fmt: skip
 def test_bindings_that_lead_nowhere(old: str, new: str, key: str) -> None:

@@ -34,7 +34,7 @@ def quantities(p: PlantParams) -> dict[str, float]:
         "T_c": p.cogging_torque,
         "U_dc": p.supply,
         "delay": p.filter_lag,
-        "constant_ratio@RA1/RA2": p.torque_constant[0] / p.torque_constant[1],
+        "K_ratio@RA1/RA2": p.torque_constant[0] / p.torque_constant[1],
     }
     for k, place in enumerate(ACTUATORS):
         six = slice(6 * k, 6 * k + 6)
