@@ -48,16 +48,25 @@ class Result:
     estimates: Found = field(default_factory=dict)
 
 
-def results(taken: Sequence[Taken], added: Sequence[Added], rig: RigFile, plan: Plan) -> list[Result]:
-    """Each loop's.
+def results(
+    taken: Sequence[Taken],
+    added: Sequence[Added],
+    rig: RigFile,
+    plan: Plan,
+    zeros: Mapping[str, Estimate] | None = None,
+) -> list[Result]:
+    """Each loop's; `zeros`, rad, as they were measured, by `zero@` and the motor.
 
     Raises:
         AnalysisError: lines that fit no mass.
     """
-    return [_result(loop, taken, [a for a in added if a.common.loop == loop], rig, plan) for loop in loops(rig, plan)]
+    lost = {m: cosine(rig, m, _off(rig, plan, m, zeros)) for m in rig.capabilities.force_currents}
+    of = {loop: [a for a in added if a.common.loop == loop] for loop in loops(rig, plan)}
+    return [_result(loop, taken, some, rig, plan, lost) for loop, some in of.items()]
 
 
-def _result(loop: str, taken: Sequence[Taken], added: Sequence[Added], rig: RigFile, plan: Plan) -> Result:
+def _result(loop: str, taken: Sequence[Taken], added: Sequence[Added], rig: RigFile, plan: Plan,
+            lost: Mapping[str, Estimate]) -> Result:  # fmt: skip
     driving = list(motors(rig, loop))
     ratio, shares = None, {name: 1 / len(driving) for name in driving}
     if added and len(driving) == 2:
@@ -70,9 +79,11 @@ def _result(loop: str, taken: Sequence[Taken], added: Sequence[Added], rig: RigF
         there = [t for t in taken if (t.common.loop, t.common.place) == (loop, place.name)]
         lines, response = _seen(there, shares, rig)
         looked.append(
-            Looked(place, there, lines, response, _constants(loop, place.name, there, lines, response, ratio, rig))
+            Looked(
+                place, there, lines, response, _constants(loop, place.name, there, lines, response, ratio, rig, lost)
+            )
         )
-    return Result(loop, looked, ratio, _estimates(loop, looked, ratio, added, rig))
+    return Result(loop, looked, ratio, _estimates(loop, looked, ratio, added, rig, lost))
 
 
 def _seen(taken: Sequence[Taken], shares: Mapping[str, float], rig: RigFile) -> tuple[list[Line], Response]:
@@ -119,7 +130,7 @@ def _per_ampere(loop: str, place: str, lines: Sequence[Line], response: Response
 
 
 def _constants(loop: str, place: str, taken: Sequence[Taken], lines: Sequence[Line], response: Response,
-               ratio: Estimate | None, rig: RigFile) -> dict[str, Estimate]:  # fmt: skip
+               ratio: Estimate | None, rig: RigFile, lost: Mapping[str, Estimate]) -> dict[str, Estimate]:  # fmt: skip
     """K of each motor over what it moves."""
     driving, per = motors(rig, loop), _per_ampere(loop, place, lines, response)
     channel = ability(rig).loops[loop].channel
@@ -131,7 +142,7 @@ def _constants(loop: str, place: str, taken: Sequence[Taken], lines: Sequence[Li
         whole = ratio if ratio is not None else Estimate.exact(1.0, "1")
         first, other = driving
         parts = {first: all_of_it * (whole / (1 + whole)), other: all_of_it / (1 + whole)}
-    return {name: part * _gain(rig, name, weights[name]) * cosine(rig, name) for name, part in parts.items()}
+    return {name: part * _gain(rig, name, weights[name]) * lost[name] for name, part in parts.items()}
 
 
 def coil_weights(taken: Sequence[Taken]) -> dict[str, Array]:
@@ -148,8 +159,20 @@ def _gain(rig: RigFile, motor: str, weights: Array) -> Estimate:
     return out
 
 
-def cosine(rig: RigFile, motor: str) -> Estimate:
-    """1/cos of the encoder's zero, which nothing here shows: its mean and spread over the tolerance, to the second order."""
+def _off(rig: RigFile, plan: Plan, motor: str, zeros: Mapping[str, Estimate] | None) -> Estimate | None:
+    """By how much the controller lays the currents of a motor wrong, rad, as it was measured; None where it was not."""
+    one, found = rig.capabilities.force_currents[motor], (zeros or {}).get(f"zero@{motor}")
+    if found is None or not one.zero:
+        return None
+    return found - plan.parameters.get(one.zero, rig.parameters[one.zero].default)
+
+
+def cosine(rig: RigFile, motor: str, off: Estimate | None = None) -> Estimate:
+    """1/cos of what the encoder's zero is `off`. Where that was not measured nothing here shows it: its mean and spread over
+    the tolerance, to the second order."""
+    if off is not None:
+        c, s = math.cos(off.value), math.sin(off.value)
+        return Estimate(1 / c, "1", (off * (s / c**2)).sensitivities)
     zero = rig.capabilities.force_currents[motor].stated
     v, u = zero.value, zero.standard_uncertainty
     fourth = u**4 * (0.5 if zero.distribution == "normal" else 0.2)  # variance of the square's half
@@ -165,8 +188,9 @@ def inertia(rig: RigFile, loop: str) -> Estimate:
 
 
 def _estimates(
-    loop: str, looked: Sequence[Looked], ratio: Estimate | None, added: Sequence[Added], rig: RigFile
-) -> Found:
+    loop: str, looked: Sequence[Looked], ratio: Estimate | None, added: Sequence[Added], rig: RigFile,
+    lost: Mapping[str, Estimate],
+) -> Found:  # fmt: skip
     driving, turns, moved = motors(rig, loop), around(rig, loop), inertia(rig, loop)
     out: Found = {}
     mean = {name: sum((x.constants[name] for x in looked), Estimate.exact(0.0)) * (1 / len(looked)) for name in driving}
@@ -176,7 +200,7 @@ def _estimates(
         out["K_over_J", loop] = sum(mean.values(), Estimate.exact(0.0))
     if ratio is not None:
         weights = coil_weights(next(x for x in looked if x.place.name == added[0].common.place).taken)
-        first, other = (_gain(rig, name, weights[name]) * cosine(rig, name) for name in driving)
+        first, other = (_gain(rig, name, weights[name]) * lost[name] for name in driving)
         out["K_ratio", "/".join(driving)] = ratio * first / other
     for x in looked:
         name = "cogging_stiffness_angle" if turns else "cogging_stiffness"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Literal
 
 from pydantic import Field
 
@@ -15,6 +16,7 @@ class Plan(BenchPlan):
     loops: tuple[str, ...] = ()  # by the rig's names; none: all along which a motor's current is known
     observer: str = "position"  # of the rig's capabilities.settings.observer, where it has any
     parameters: dict[str, float] = Field(default_factory=dict)  # of the controller, once it levitates
+    zeros: Literal["stated", "calibration"] = "stated"  # of the encoders: as the rig file states, or by encoder-zero
     places_m: tuple[float, ...] = Field(
         (9.375e-3, 12.5e-3), min_length=2
     )  # along: where cogging's slope has either sign

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from itertools import count
 
+from bench.calibration import Need
 from bench.errors import AnalysisError, BenchError
 from bench.figures import Figure
 from bench.findings import Effect, Finding, Findings
@@ -55,6 +56,7 @@ SLOPE_ANGLE = Quantity("cogging_stiffness_angle", "N m/rad", "slope of what turn
 MEASURES = (K_FORCE, K_TORQUE, K_OVER_J, RATIO, SLOPE, SLOPE_ANGLE)
 MARGIN_S = 1e-3  # of a capture
 OBSERVER = "observer"
+ZEROS = "encoder-zero"
 
 
 def step_count(plan: Plan) -> int:
@@ -74,6 +76,11 @@ def adds(rig: RigFile, plan: Plan, loop: str) -> bool:
     """Whether a current is added to one of two motors."""
     driving = list(motors(rig, loop).values())
     return plan.added_A > 0 and len(driving) == 2 and bool(driving[0].added)
+
+
+def needs(plan: Plan) -> tuple[Need, ...]:
+    """The zeros of the encoders, where the plan wants them measured."""
+    return (Need(ZEROS),) if plan.zeros == "calibration" else ()
 
 
 def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
@@ -140,7 +147,8 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> list[Result]:
     taken, added = read_taken(recording), read_added(recording)
     findings.gate(checks.of_signals(taken, added, rig, plan))
     try:
-        results = estimates.results(taken, added, rig, plan)
+        zeros = recording.calibration(ZEROS).values if needs(plan) else None
+        results = estimates.results(taken, added, rig, plan, zeros)
     except AnalysisError as error:
         findings.end(Finding("no-mass", f"{error}.", "", Effect.ERROR))
     findings.add(checks.of_results(results, rig, plan))
@@ -249,6 +257,7 @@ procedure = Procedure(
     requires=requires,
     check=check,
     settings=settings,
+    needs=needs,
     step_count=step_count,
     steps_on=steps_on,
     fewest_steps=lambda plan: 1,

@@ -116,6 +116,17 @@ def test_the_cosine_of_a_zero() -> None:
     assert found.u == pytest.approx(drawn.std(), rel=2e-3)
 
 
+def test_the_cosine_of_a_zero_that_was_measured() -> None:
+    """10 degrees electrical off the controller's parameter, with u of 0.1 degrees: 1/cos, and its slope."""
+    zero = Estimate.of(math.radians(10), Influence("zero", "zero", math.radians(0.1), "rad", "A", "normal"))
+    found = estimates.cosine(RIG, "LA", zero)
+    assert found.value == pytest.approx(1.015427, abs=1e-6)
+    assert found.u == pytest.approx(math.radians(0.1) * math.tan(math.radians(10)) * 1.015427, rel=1e-5)
+    shifted = estimates._off(RIG, Plan(parameters={"zero.la": math.radians(10)}), "LA", {"zero@LA": zero})
+    assert shifted is not None
+    assert shifted.value == pytest.approx(0.0, abs=1e-12)
+
+
 @pytest.mark.parametrize("motor", ["LA", "RA1"])
 def test_offsets_along_the_field(motor: str) -> None:
     """(2/n) sum p_d o of a winding of n coils at a phase, by hand."""
