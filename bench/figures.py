@@ -16,7 +16,7 @@ class Series:
     """One curve or cloud of points. `u` draws 95 % error bars of half-length `u` on y.
 
     "faint" is a thin grey curve, "ridge" a thin one that hides what is behind and below it, "guide" a dashed curve in ink for
-    limits and circles, "mark" filled dots in the colour of the curve before.
+    limits and circles, "mark" filled dots in the colour of the curve before. What has no `label` is not in the legend.
     """
 
     label: str
@@ -57,6 +57,7 @@ class Figure:
     log_x: bool = False
     log_y: bool = False
     ticks: tuple[tuple[str, float], ...] = field(default=())  # names in place of numbers on the x axis: text, x
+    y_ticks: tuple[tuple[str, float], ...] = field(default=())  # the same on the y axis
     downward: bool = False  # y grows downwards, as phase lags are drawn
     closer: tuple[float, float, float] | None = None  # of a plane: beside it the same, about x, y and so far each way
     below: Figure | None = None  # a second panel on the same x axis, of which labels, series and the like are drawn

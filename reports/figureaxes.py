@@ -49,6 +49,8 @@ def plain(axes: Axes, figure: Figure) -> list[Artist]:
             _decades(axis)
     if figure.ticks:
         axes.set_xticks([x for _, x in figure.ticks], [label for label, _ in figure.ticks])
+    if figure.y_ticks:
+        axes.set_yticks([y for _, y in figure.y_ticks], [label for label, _ in figure.y_ticks])
     if figure.below is not None and figure.below.downward:
         axes.set_ylim(bottom=0)  # the amplitude over its lag
     for axis, label in ((axes.xaxis, figure.x_label), (axes.yaxis, figure.y_label)):

@@ -166,7 +166,8 @@ def _panel(axes: Axes, figure: Figure) -> list[Artist]:
     kinds.notes(axes, figure)
     if not any(s.x.size for s in dense) and figure.grid is None:
         axes.text(0.5, 0.5, "no data", transform=axes.transAxes, ha="center", va="center", color=INK)
-    shown = [d for s, look, d in zip(dense, looks, drawn, strict=False) if s.style != "ridge" and "fit" not in look]
+    told = [(d, s) for s, look, d in zip(dense, looks, drawn, strict=False) if s.style != "ridge" and "fit" not in look]
+    shown = [d for d, s in told if s.label]
     return shown + drawn[len(dense) :]
 
 

@@ -13,7 +13,7 @@ from bench.procedure import BenchPlan
 class Plan(BenchPlan):
     """Settings of the injections and of the added currents, SI."""
 
-    loops: tuple[str, ...] = ()  # by the rig's names; none: all along which a motor's current is known
+    loops: Literal["all", "along", "around"] = "all"  # of those along which a motor's current is known
     observer: str = "position"  # of the rig's capabilities.settings.observer, where it has any
     parameters: dict[str, float] = Field(default_factory=dict)  # of the controller, once it levitates
     zeros: Literal["stated", "calibration"] = "stated"  # of the encoders: as the rig file states, or by encoder-zero

@@ -167,10 +167,12 @@ def measured(results: Sequence[Result]) -> Iterator[Measured]:
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
     can, known = ability(rig), tuple(dict.fromkeys(one.loop for one in rig.capabilities.force_currents.values()))
-    for key, names in (("loops", plan.loops), ("amplitude", plan.amplitude)):
-        if unknown := [name for name in names if name not in known]:
-            yield f"{key}: found {', '.join(unknown)}; motors are known along {', '.join(known)}"
-            return
+    if unknown := [name for name in plan.amplitude if name not in known]:
+        yield f"amplitude: found {', '.join(unknown)}; motors are known along {', '.join(known)}"
+        return
+    if not loops(rig, plan):
+        yield f"loops: found {plan.loops!r}; motors are known along {', '.join(known)}"
+        return
     observers = rig.capabilities.settings.get(OBSERVER, {})
     if observers and plan.observer not in observers:
         yield f"observer: found {plan.observer!r}; expected one of {', '.join(observers)}"
@@ -244,6 +246,12 @@ def untold(rig: RigFile) -> tuple[Quantity, ...]:
     return (*along, *(() if turns else (K_TORQUE, K_OVER_J, SLOPE_ANGLE)), *(() if two else (RATIO,)))
 
 
+def left_out(plan: Plan) -> tuple[Quantity, ...]:
+    """Those of the other loops, and the ratio where no current is added; which loop has two motors the rig alone knows."""
+    others = {"all": (), "along": (K_TORQUE, K_OVER_J, SLOPE_ANGLE), "around": (K_FORCE, SLOPE)}[plan.loops]
+    return (*others, *(() if plan.added_A and plan.loops == "all" else (RATIO,)))
+
+
 procedure = Procedure(
     name="actuator-constant",
     title="Force and torque constants of a mover's motors",
@@ -263,7 +271,7 @@ procedure = Procedure(
     fewest_steps=lambda plan: 1,
     untold=untold,
     optional=MEASURES,  # of none but the loops that are chosen
-    left_out=lambda plan: () if plan.added_A else (RATIO,),
+    left_out=left_out,
     assumes=assumptions.ACTUATOR_CONSTANT,
     method=read_method(__file__),
 )

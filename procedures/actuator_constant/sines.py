@@ -29,8 +29,9 @@ def motors(rig: RigFile, loop: str) -> dict[str, ForceCurrent]:
 
 
 def loops(rig: RigFile, plan: Plan) -> tuple[str, ...]:
-    """Those of the plan, or all that are known."""
-    return plan.loops or tuple(dict.fromkeys(one.loop for one in rig.capabilities.force_currents.values()))
+    """Those that the plan wants, of all that are known."""
+    known = dict.fromkeys(one.loop for one in rig.capabilities.force_currents.values())
+    return tuple(x for x in known if plan.loops == "all" or around(rig, x) == (plan.loops == "around"))
 
 
 def around(rig: RigFile, loop: str) -> bool:

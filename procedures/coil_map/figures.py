@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import takewhile
 
 import numpy as np
 
 from bench.figures import Figure, Grid, Series, Sheet
 from procedures.coil_map.estimates import Array, Result, asked, response
 
+FEW = 6  # columns whose names have room
 GAP = 1.0  # column between what was expected and what was found
 
 
@@ -17,28 +19,33 @@ def all_figures(r: Result) -> Iterator[Figure | Sheet]:
     names = [f"{name} {way}" for name, way in r.rows]
     yield _pair("currents", "Currents of the coils", "Each coil's current of 1 A along d and q of each system, at the angle of "
                 "the pulses: left as the winding gives it, right as it was read.", names, r.can.coils, r.expected, r.found,
-                "current / A")  # fmt: skip
+                "current / A", "coil")  # fmt: skip
     caption = (
         "Left what a right winding moves, right what was seen: pulses around and along as a share of the greatest of that "
         "axis, aside as a share of the ring. A pulse aside shows as much as the mover can roll; which way the bearings push is "
         "in the next figures."
     )
     wanted = asked(r.can, r.rows)
-    yield _pair("moves", "What each system moves", caption, names, r.can.axes, wanted, response(r), "share")
+    yield _pair("moves", "What each system moves", caption, names, r.can.axes, wanted, response(r), "share", "axis")
     for name, p in r.pushed.items():
         yield _around(name, r, p.places)
     yield table(r)
 
 
 def _pair(key: str, title: str, caption: str, rows: list[str], columns: tuple[str, ...], one: Array, other: Array,
-          label: str) -> Figure:  # fmt: skip
+          label: str, what: str) -> Figure:  # fmt: skip
     """Two tables beside each other, one scale for both."""
     n = len(columns)
     values = np.hstack([one, np.full((len(rows), 1), np.nan), other])
     x = np.arange(values.shape[1], dtype=float)
-    ticks = tuple((name, float(k + shift)) for shift in (0, n + int(GAP)) for k, name in enumerate(columns))
-    notes = tuple((name, -1.6, float(k)) for k, name in enumerate(rows))
-    return Figure(key, title, caption + f" Rows from below: {', '.join(rows)}.", "", "", (), ticks=ticks, notes=notes,
+    alike = [*takewhile(lambda letters: len({*letters}) == 1, zip(*columns, strict=False))]
+    shared = len(alike) if n > FEW else 0  # of many only numbers, and not each, have room
+    ticks = tuple(
+        (columns[k][shared:], float(k + shift)) for shift in (0, n + int(GAP)) for k in range(0, n, 1 + n // FEW)
+    )
+    of = f" {columns[0][:shared]}…" if shared else ""
+    return Figure(key, title, caption, f"{what}{of}: as it should be, and as found", "", (), ticks=ticks,
+                  y_ticks=tuple((name, float(k)) for k, name in enumerate(rows)),
                   grid=Grid(x, np.arange(len(rows), dtype=float), values, label))  # fmt: skip
 
 

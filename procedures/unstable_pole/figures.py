@@ -26,8 +26,11 @@ def _shots(result: Result) -> Figure:
         t, curve = result.shots[k], result.release.curves[k]
         ms = np.arange(len(curve), dtype=np.float64) * (t.step_s * 1e3)
         z = t.z[result.axis] * 1e6
-        series += [Series("" if series else "mean of both planes", ms, z[:, 0], "points"),
-                   Series("", ms, curve[:, 0] * 1e6, "guide"), Series("", ms, curve[:, 1] * 1e6, "faint")]  # fmt: skip
+        names = (
+            ("", "", "") if series else ("mean of both planes, each shot", "its fit", "half their difference, fitted")
+        )
+        series += [Series(names[0], ms, z[:, 0], "points"), Series(names[1], ms, curve[:, 0] * 1e6, "guide"),
+                   Series(names[2], ms, curve[:, 1] * 1e6, "faint")]  # fmt: skip
         left.append(Series("", ms, z[:, 0] - curve[:, 0] * 1e6, "faint"))
     below = Figure(f"left-{result.axis}", "", "", "time / ms", "left / µm", tuple(left))
     pole = result.estimates["pole"].value

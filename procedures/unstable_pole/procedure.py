@@ -29,7 +29,7 @@ from procedures.unstable_pole.hold import SPARE, ability, captured, chosen, fore
 from procedures.unstable_pole.plan import Plan
 from procedures.unstable_pole.steps import STATE, STEP, read_taken
 
-POLE = Quantity("pole", "rad/s", "how fast both planes leave their place together, held currents: sqrt((K_1 + K_2)/m)",
+POLE = Quantity("pole", "1/s", "how fast both planes leave their place together, held currents: sqrt((K_1 + K_2)/m)",
                 title="unstable pole")  # fmt: skip
 STIFFNESS = Quantity("stiffness", "N/m", "of both planes together, negative; computed: pole squared times the stated mass",
                      title="negative stiffness, computed")  # fmt: skip

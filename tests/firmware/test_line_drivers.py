@@ -131,14 +131,14 @@ def test_a_step_of_a_current(line_program: Path, rig_folder: Path, kind: str, pl
 
 
 def test_everything_at_once(line_program: Path, rig_folder: Path, kind: str) -> None:
-    """All 63 channels at 35 kHz while telemetry goes on."""
+    """All 64 channels at 35 kHz while telemetry goes on."""
     with controller(line_program, "tcp", kind, PATIENT_MS) as there, opened(rig_folder, kind, there.url) as rig:
         assert rig.capture is not None
         rig.capture.arm(rig.capture.channels, seconds=0.2, rate_hz=35_000)
         rig.capture.wait(5.0)
         data = rig.capture.upload()
         counters = rig.health().counters
-    assert len(data.columns) == 63
+    assert len(data.columns) == 64
     assert {len(v) for v in data.columns.values()} == {7000}
     assert (counters.lost, counters.gaps) == (0, 0)
 

@@ -108,7 +108,11 @@ def listening(folder: Path, url: str) -> Callable[[], list[tuple[float, float]]]
     ("rig_name", "procedure", "plan"),
     [("lira-200v", "current-step", ("repeats=4", "small_repeats=4")),
      ("lira", "mission", ("repeats=2", "spare_s=0.5")),
-     ("lira", "loop-response", ("axes=['z', 'gamma']",))],
+     ("lira", "loop-response", ("axes=['z', 'gamma']",)),
+     ("lira", "coil-map", ("repeats=2",)),
+     ("lira", "encoder-zero", ("motors=['LA']", "repeats=3", "trial_rad=0")),
+     ("lira", "unstable-pole", ("shots=8",)),
+     ("lira", "actuator-constant", ("loops=along",))],
 )  # fmt: skip
 def test_procedures_over_the_command_line(tmp_path: Path, rig_name: str, procedure: str, plan: tuple[str, ...]) -> None:
     """Each against a served rig, as processes: what is measured holds what the machine was drawn with."""

@@ -179,21 +179,21 @@ def test_a_drawn_machine_is_within_its_intervals(tmp_path: Path) -> None:
 
 def test_neither_zero_nor_mass_is_shown(tmp_path: Path) -> None:
     """A zero that is 10 degrees off reads as its cosine, another mass than the rig file's as its share."""
-    plain = run(tmp_path, {"zero_la": 0.0, "machine.mass": 1.34}, loops=("z",))
+    plain = run(tmp_path, {"zero_la": 0.0, "machine.mass": 1.34}, loops="along")
     before = values(plain)["K_force@LA"].estimate.value
-    turned = run(tmp_path, {"zero_la": math.radians(10), "machine.mass": 1.02 * 1.34}, loops=("z",))
+    turned = run(tmp_path, {"zero_la": math.radians(10), "machine.mass": 1.02 * 1.34}, loops="along")
     assert wrong(turned) == {}
     expected = math.cos(math.radians(10)) / 1.02
     assert values(turned)["K_force@LA"].estimate.value / before == pytest.approx(expected, rel=1e-3)
 
 
 def test_a_loop_at_its_limit_is_told(tmp_path: Path) -> None:
-    told = wrong(run(tmp_path, loops=("z",), amplitude={"z": 4e-4}))["loop-limited"]
+    told = wrong(run(tmp_path, loops="along", amplitude={"z": 4e-4}))["loop-limited"]
     assert told.concerns == ("K_force@LA", "@z")
 
 
 def test_motion_that_is_lost_in_noise_is_told(tmp_path: Path) -> None:
-    assert {"loop-not-shown", "no-mass"} & set(wrong(run(tmp_path, loops=("z",), amplitude={"z": 1e-8})))
+    assert {"loop-not-shown", "no-mass"} & set(wrong(run(tmp_path, loops="along", amplitude={"z": 1e-8})))
 
 
 # Checks.
@@ -273,7 +273,10 @@ def test_refusals() -> None:
     assert procedure.lacking(RIG) == ()
     assert list(check(RIG, Plan())) == []
     assert steps_on(RIG, Plan()) == 4 * 7 + 10
-    assert "loops: found x1" in next(iter(check(RIG, Plan(loops=("x1",)))))
+    one = RIG.capabilities.force_currents["LA"]
+    alone = RIG.model_copy(update={"capabilities": RIG.capabilities.model_copy(update={"force_currents": {"LA": one}})})
+    assert list(check(alone, Plan(loops="along"))) == []
+    assert "loops: found 'around'" in next(iter(check(alone, Plan(loops="around"))))
     assert "ref_w" in next(iter(check(RIG, Plan(parameters={"ref_w": 1.0}))))
     assert "observer" in next(iter(check(RIG, Plan(observer="none"))))
     assert "high_hz" in next(iter(check(RIG, Plan(high_hz=12e3))))

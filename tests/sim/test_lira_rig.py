@@ -46,9 +46,11 @@ MOVES = {
         ("coil_resistance_spread", "coil_r"), ("coil_inductance_spread", "coil_l"), ("filter_inductance", "filter_l"),
         ("damper_resistance", "damper_r"), ("capacitor_derating_filter", "filter_c"),
         ("capacitor_derating_damper", "damper_c"))},
-    "site.air_density": "", "machine.pole_pairs": "", "rest_angle": "", **{f"u_s{k}.offset": "" for k in HALVES},
+    "site.air_density": "", "machine.pole_pairs": "", "machine.pair_pitch": "", "rest_angle": "",
+    **{f"u_s{k}.offset": "" for k in HALVES},
 }  # fmt: skip
-"""What moves which field of the plant: the air bears nothing, poles are counted, and voltages have no offset."""
+"""What moves which field of the plant: the air bears nothing, poles are counted, of the pitch it is the simulation's
+own number that counts, and voltages have no offset."""
 
 
 @cache

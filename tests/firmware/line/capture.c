@@ -129,10 +129,10 @@ static void arm(int words, char **word)
     int fine = !*end && number_of(word[1], &rate) && number_of(word[2], &length) && number_of(word[3], &before);
     if (!fine || !trigger_of(words - 4, word + 4)) { fail(ARGUMENTS, "MASK RATE LENGTH BEFORE now|step|level"); return; }
     unsigned n = 0;
-    for (unsigned k = 0; k < 64; k++) if (c.mask >> k & 1 && k < CHANNELS) c.list[n++] = k;
+    for (unsigned k = 0; k < CHANNELS; k++) if (c.mask >> k & 1) c.list[n++] = k;
     c.every = rate > 0 ? (unsigned)(TICKS / rate + 0.5) : 0;
     int known = rate == 35000 || rate == 140000 || rate == 280000;
-    if (!n || c.mask >> CHANNELS) { fail(RANGE, "channels 0..%d", CHANNELS - 1); return; }
+    if (!n) { fail(RANGE, "channels 0..%d", CHANNELS - 1); return; }
     if (!known) { fail(RANGE, "35000|140000|280000"); return; }
     if ((n > 16 && c.every < 8) || length < 1 || before < 0 || before >= length || length * n * 2 > MEMORY) {
         fail(RANGE, "16 channels above 35000 Hz, %u bytes", MEMORY);

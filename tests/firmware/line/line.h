@@ -6,7 +6,7 @@
 
 #define TICKS 280000u /* in a second */
 #define CURRENTS 10
-#define CHANNELS 63
+#define CHANNELS 64 /* as many as a mask has bits */
 #define MEMORY (32u * 1024 * 1024)
 #define COUNT(array) ((int)(sizeof(array) / sizeof((array)[0])))
 

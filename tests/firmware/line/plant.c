@@ -156,6 +156,6 @@ double channel_value(int k)
     if (k < 45) return coil(k - 30) + NOISE * noise();
     if (k == 45) return SUPPLY + 0.1 * noise();
     if (k < 52) return place(k - 46);
-    if (k == 62) return 0; /* it injects nothing */
+    if (k >= 62) return 0; /* it injects nothing, and holds nothing */
     return current[k - 52].value + NOISE * noise();
 }

@@ -79,6 +79,7 @@ void table_start(void)
         add(52 + k, name, "A", 1e-3);
     }
     add(62, "wave", "1", 1.0 / 32768);
+    add(63, "held", "1", 1);
     for (int k = 0; k < parameter_count; k++) parameters[k].value = parameters[k].saved = (float)parameters[k].delivered;
 }
 
