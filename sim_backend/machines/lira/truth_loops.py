@@ -34,7 +34,7 @@ GRID, SHORT_S = 12, 0.15  # lines of a first look, and how long each goes on bef
 PERIODS = 10
 NEAR: Final = 1e-5  # of a frequency
 SMALL: Final = {"x1": 2e-7, "x2": 2e-7, "y1": 2e-7, "y2": 2e-7, "z": 5e-6, "angle": 1e-4}  # m and rad
-NOISY: Final = 4.0  # times as large is a sine beside noise
+NOISY: Final = {SENSOR: 10.0, REFERENCE: 4.0}  # times as large is a sine beside noise
 NOISY_S: Final = 4.0
 BESIDE: Final = 0.01  # of a frequency, where the slope is taken
 
@@ -46,10 +46,11 @@ def quiet(p: PlantParams) -> PlantParams:
 
 
 def noisy(p: PlantParams) -> PlantParams:
-    """The same machine with the noise of its sensors. Rounding of the positions is noise of q/sqrt(12) here: of a sine it takes
-    another share at each size and place, which is in a run's budget."""
-    both = tuple(math.hypot(s, q / math.sqrt(12)) for s, q in zip(p.position_noise, p.position_lsb, strict=True))
-    return replace(p, position_noise=both, position_lsb=(0.0,) * 6)
+    """The same machine with the noise of its sensors. Where that is less than half of a position's step, rounding is noise
+    of q/sqrt(12) here: of a sine it takes another share at each size and place, which is in a run's budget."""
+    pairs = zip(p.position_noise, p.position_lsb, strict=True)
+    told = [(s, q) if s >= q / 2 else (math.hypot(s, q / math.sqrt(12)), 0.0) for s, q in pairs]
+    return replace(p, position_noise=tuple(s for s, _ in told), position_lsb=tuple(q for _, q in told))
 
 
 class Flying:
@@ -146,7 +147,7 @@ def loops(rig: RigFile, drawn: Truth, asked: LoopsAsked) -> dict[tuple[str, str]
 def _in_noise(drawn: Truth, asked: LoopsAsked, axis: str, place: float, hz: float, settle_s: float) -> float:
     """A size in the noise of the machine's own sensors."""
     halves = []
-    for amplitude in (NOISY * SMALL[axis], -NOISY * SMALL[axis]):
+    for amplitude in (NOISY[place] * SMALL[axis], -NOISY[place] * SMALL[axis]):
         flying = Flying(drawn, asked.settings, noise=1)
         flying.go(asked.points, asked.settings)
         halves.append(flying.answer(axis, place, hz, settle_s, amplitude, NOISY_S))
