@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from bench.rigfile.check_current_steps import near
+from bench.rigfile.check_current_steps import Line, near
 from bench.rigfile.model import RigFile
 from bench.rigfile.places import Places
-
-Line = tuple[str, str, str]
 
 
 def problems_of(rig: RigFile) -> Iterator[Line]:

@@ -11,10 +11,10 @@ from bench.errors import Lacking
 from bench.rigfile import RigFile
 from bench.rigfile.capabilities_of_loops import CurrentStep, ForceCurrent, InjectedLoop
 from procedures.encoder_zero.plan import Plan
+from procedures.position_loops.injection import USUAL_HZ, ability
 from procedures.position_loops.motors import electrical_turn
 from procedures.shared.rates import rate_of
 
-USUAL_HZ = 35e3
 ALONG, ACROSS = "along", "across"
 PLACES = 2  # a quarter of an electrical turn apart: there currents of unequal gains turn the other way
 UNKNOWN_S = 0.25  # of a loop whose gains the rig file does not tell
@@ -64,10 +64,7 @@ def loop_of(rig: RigFile, loop: str) -> InjectedLoop:
     Raises:
         Lacking: the rig file tells of none.
     """
-    can = rig.capabilities.loop_injection
-    if can is None:
-        raise Lacking("capabilities: found no loop_injection")
-    return can.loops[loop]
+    return ability(rig).loops[loop]
 
 
 def groups(rig: RigFile, plan: Plan | None = None) -> tuple[Group, ...]:
