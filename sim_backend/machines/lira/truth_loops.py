@@ -9,7 +9,7 @@ bandwidth. Two machines with the same noise have the sine upside down from each 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Final
@@ -37,6 +37,7 @@ SMALL: Final = {"x1": 2e-7, "x2": 2e-7, "y1": 2e-7, "y2": 2e-7, "z": 5e-6, "angl
 NOISY: Final = {SENSOR: 10.0, REFERENCE: 4.0}  # times as large is a sine beside noise
 NOISY_S: Final = 4.0
 BESIDE: Final = 0.01  # of a frequency, where the slope is taken
+TOP: Final = 0.12  # between three frequencies about a greatest one, as a share
 
 
 def quiet(p: PlantParams) -> PlantParams:
@@ -136,22 +137,35 @@ def loops(rig: RigFile, drawn: Truth, asked: LoopsAsked) -> dict[tuple[str, str]
         at = _fall(size, asked.low_hz, asked.high_hz, settle_s)
         if at is not None:
             slope = math.log(size(at * (1 + BESIDE), settle_s) / HALF) / math.log(1 + BESIDE)
-            out["bandwidth", name] = at * (in_noise(axis, REFERENCE, at, settle_s) / HALF) ** (-1 / slope)
+            out["bandwidth", name] = at * (in_noise(axis, REFERENCE, [at], settle_s)[0] / HALF) ** (-1 / slope)
     for name in asked.sensitive:
         axis = AXES_OF_LINE[name]
-        _, at = _top(partial(flying.size, axis, SENSOR), asked.low_hz, asked.high_hz, asked.axes[name])
-        out["s_max", name], out["s_max_hz", name] = in_noise(axis, SENSOR, at, asked.axes[name]), at
+        size = partial(flying.size, axis, SENSOR)
+        _, at = _top(size, asked.low_hz, asked.high_hz, asked.axes[name])
+        beside = [at * math.exp(d) for d in (-TOP, 0.0, TOP)]
+        still = _vertex([size(hz, asked.axes[name]) for hz in beside])[1]
+        out["s_max", name], moved = _vertex(in_noise(axis, SENSOR, beside, asked.axes[name]))
+        out["s_max_hz", name] = at * math.exp(moved - still)
     return out
 
 
-def _in_noise(drawn: Truth, asked: LoopsAsked, axis: str, place: float, hz: float, settle_s: float) -> float:
-    """A size in the noise of the machine's own sensors."""
+def _vertex(sizes: Sequence[float]) -> tuple[float, float]:
+    """Of the parabola through the logarithms of three sizes, TOP apart: its value and where it is, from the middle one."""
+    below, middle, above = np.log(sizes)
+    c, b = (below - 2 * middle + above) / 2, (above - below) / 2
+    return math.exp(middle - b * b / (4 * c)), -b / (2 * c) * TOP
+
+
+def _in_noise(
+    drawn: Truth, asked: LoopsAsked, axis: str, place: float, lines: Sequence[float], settle_s: float
+) -> list[float]:
+    """Sizes at some frequencies in the noise of the machine's own sensors."""
     halves = []
     for amplitude in (NOISY[place] * SMALL[axis], -NOISY[place] * SMALL[axis]):
         flying = Flying(drawn, asked.settings, noise=1)
         flying.go(asked.points, asked.settings)
-        halves.append(flying.answer(axis, place, hz, settle_s, amplitude, NOISY_S))
-    return size_of((halves[0] + halves[1]) / 2, place)
+        halves.append([flying.answer(axis, place, hz, settle_s, amplitude, NOISY_S) for hz in lines])
+    return [size_of((up + down) / 2, place) for up, down in zip(*halves, strict=True)]
 
 
 Size = Callable[[float, float], float]
