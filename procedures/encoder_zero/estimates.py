@@ -13,9 +13,9 @@ from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
 from procedures.encoder_zero import fit
 from procedures.encoder_zero.fit import Field
-from procedures.encoder_zero.groups import PLACES, Group, groups, loop_of, settle_s, slowest_s, zeros
+from procedures.encoder_zero.groups import ALONG, PLACES, Group, groups, loop_of, settle_s, slowest_s, step_of, zeros
 from procedures.encoder_zero.plan import Plan
-from procedures.encoder_zero.steps import Answers, Taken, answers
+from procedures.encoder_zero.steps import Answers, Taken, answers, column
 from procedures.position_loops.motors import electrical_turn, phase_rate
 from procedures.shared.certificates import certified_gain
 
@@ -106,7 +106,7 @@ def _zero(motor: str, place: At, angle: float, rig: RigFile) -> Estimate:
     for name, slope in zip(rig.motors[motor].currents, _gains(rig, motor, angle, phase - known)[0], strict=True):
         out = out + slope * (_gain(rig, name) - 1)
     rounded = Estimate(0.0, RAD, {_rounding(place, rig): phase_rate(rig, motor)})
-    return out + rounded
+    return out + rounded + Estimate.of(0.0, _rounded_currents(motor, place, rig))
 
 
 def _gain(rig: RigFile, channel: str) -> Estimate:
@@ -127,10 +127,31 @@ def _rounding(place: At, rig: RigFile) -> Influence:
     assert rig.capture is not None
     count, unit = rig.capture.channels[channel].scale, rig.channels[channel].unit
     beside = abs(math.sin(2 * math.pi * place.answers.reading / count))
-    noise = max(place.answers.noise**2 / count**2 - 1 / 12, 0.0)  # squares of counts
+    noise = max(place.answers.noise[0] ** 2 / count**2 - 1 / 12, 0.0)  # squares of counts
     off = count / math.pi * math.exp(-2 * math.pi**2 * noise) * beside
     name = f"rounding of {channel} at place {place.answers.place + 1}"
     return Influence(f"rounding/{loop}/{place.answers.place}", name, off / math.sqrt(3), unit, "B", "rectangular")
+
+
+def _rounded_currents(motor: str, place: At, rig: RigFile) -> Influence:
+    """What rounding the captured dq currents does to an angle. They are made of the counts Q of n coils at three angles, n/3 at
+    each: of so few values that rounding them to q once more does not average out, alike each time. Of independent errors of
+    rounding the mean keeps q/sqrt(12) times the root of the sum of squares of their shares: for normal counts of standard
+    deviation s at each angle that is (2 sqrt(pi) s)^(-3/2), s = n/sqrt(6) of that of i_d or i_q in Q. Each answer is half of
+    the difference of two means, and an angle the sum of one of each motor, over what is stepped."""
+    found, channel = place.answers, step_of(rig, motor).along
+    coils = rig.motors[motor].currents
+    assert rig.capture is not None
+    known = rig.capture.channels
+    count = max((known[c].scale for c in coils if c in known), default=0.0)
+    own = column(found.group, motor, ALONG)
+    noise = float(min((s for s in found.noise[own : own + 2] if s > 0), default=0.0))
+    counts = len(coils) / math.sqrt(6) * noise / count if count else math.inf
+    kept = min((2 * math.sqrt(math.pi) * counts) ** -1.5, 1.0) if counts > 0 else 1.0
+    stepped = abs(float(found.pairs[:, found.group.stepped.index((motor, ALONG)), own].mean()))
+    u = known[channel].scale / math.sqrt(12) * kept * math.sqrt(len(found.group.motors) / 2) / stepped
+    name = f"rounding of the currents at place {found.place + 1}"
+    return Influence(f"rounded currents/{motor}/{found.place}", name, u, RAD, "B", "normal", source="counts of the currents")
 
 
 def _scatter(name: str, each: Array, unit: str) -> Influence:

@@ -20,8 +20,8 @@ STATE = "state"
 @dataclass(frozen=True)
 class Taken:
     """A current of one sign, `asked` A: means (channels,) over the window, and over each half of it (2, channels), of the
-    mover's reading and of i_d and i_q of each motor; None where it was not captured. `noise` is the standard deviation of the
-    mover's reading. `limited`: share of the telemetry at the loop's limit."""
+    mover's reading and of i_d and i_q of each motor; None where it was not captured. `noise` (channels,) are their standard
+    deviations. `limited`: share of the telemetry at the loop's limit."""
 
     loop: str
     place: int
@@ -33,7 +33,7 @@ class Taken:
     asked: float
     means: Array | None
     halves: Array
-    noise: float
+    noise: Array
     limited: float
     states: tuple[str, ...]
     lost: int
@@ -61,12 +61,12 @@ def _read(recording: Recording[Plan], step: Step, group: Group) -> Taken:
         flags = told[bit.channel].astype(np.int64)
         limited = float(np.mean(flags != 0 if bit.mask is None else flags & bit.mask != 0))
     found = recording.captures(number=labels["number"])
-    means, halves, noise = None, np.empty((2, 0)), 0.0
+    means, halves, noise = None, np.empty((2, 0)), np.empty(0)
     if found and found[0].samples >= 2:
         columns = found[0].arrays(*captured(rig, group))
         x = np.array([columns[name] for name in captured(rig, group)])
         means, half = x.mean(axis=1), x.shape[1] // 2
-        halves, noise = np.array([x[:, :half].mean(axis=1), x[:, half:].mean(axis=1)]), float(x[0].std())
+        halves, noise = np.array([x[:, :half].mean(axis=1), x[:, half:].mean(axis=1)]), x.std(axis=1)
     states = tuple(names.get(int(code), str(int(code))) for code in np.unique(told[STATE]))
     return Taken(
         group.loop, int(labels["place"]), str(labels["trial"]), str(labels["motor"]), str(labels["way"]), int(labels["repeat"]),
@@ -78,7 +78,7 @@ def _read(recording: Recording[Plan], step: Step, group: Group) -> Taken:
 class Answers:
     """Of a group at a place: `pairs` (repeats, currents, channels), half of what + shows less what - shows, of the mover's
     reading and of i_d and i_q of each motor; `halves` alike (2, repeats, currents, channels) of each half of the windows.
-    `reading` is the mover's mean, `noise` its standard deviation."""
+    `reading` is the mover's mean, `noise` (channels,) standard deviations in a window."""
 
     group: Group
     place: int
@@ -86,7 +86,7 @@ class Answers:
     pairs: Array
     halves: Array
     reading: float
-    noise: float
+    noise: Array
 
     @property
     def rows(self) -> Array:
@@ -105,7 +105,7 @@ def answers(taken: Sequence[Taken], group: Group, place: int, trial: str = "") -
     pairs = np.array([[(a.means - b.means) / 2 for a, b in row] for row in whole])  # type: ignore[operator]
     halves = np.array([[[(a.halves[k] - b.halves[k]) / 2 for a, b in row] for row in whole] for k in (0, 1)])
     reading = float(np.mean([t.means[0] for t in some if t.means is not None]))
-    return Answers(group, place, trial, pairs, halves, reading, float(np.mean([t.noise for t in some])))
+    return Answers(group, place, trial, pairs, halves, reading, np.mean([t.noise for t in some], axis=0))
 
 
 def column(group: Group, motor: str, way: str) -> int:

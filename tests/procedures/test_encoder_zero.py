@@ -119,7 +119,17 @@ def _taken(group: Group, at: np.ndarray, one: Setting, plan: Plan) -> Taken:
     jitter = 1e-7 * one.repeat * one.sign
     means = np.array([target(RIG, group, one.place), *(rows.ravel() + jitter)])
     of = (one.loop, one.place, one.trial, one.motor, one.way, one.repeat, one.sign)
-    return Taken(*of, size, means, np.array([means, means]), 3e-5, 0.0, ("LEVITATED",), 0, 100)
+    return Taken(
+        *of,
+        size,
+        means,
+        np.array([means, means]),
+        np.array([3e-5, *np.full(rows.size, 5e-3)]),
+        0.0,
+        ("LEVITATED",),
+        0,
+        100,
+    )
 
 
 def told(taken: list[Taken], plan: Plan) -> set[str]:
