@@ -1,8 +1,8 @@
 """Parameters of the rotary-linear switched reluctance motor's plant and of its controller, by the names of the core's structs.
 
-R is Pan, Meng, Cao, IET Electr. Power Appl. 8 (2014) 199. It prints gap, mass, turns, arcs, resistance, encoders and gains; map,
-inertia, friction, supply and limits are stand-ins, with where they come from. Pairs are (x, angle); six numbers are phases
-A, B, C of stator 0, at -x, then of stator 1.
+R is Pan, Meng, Cao, IET Electr. Power Appl. 8 (2014) 199. It prints gap, mass, turns, arcs, resistance, encoders and gains;
+map, inertia, friction, supply and limits are stand-ins, with where they come from. Pairs are (x, angle); six numbers are
+phases A, B, C of stator 0, at -x, then of stator 1.
 """
 
 from __future__ import annotations

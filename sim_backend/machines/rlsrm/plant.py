@@ -130,6 +130,11 @@ class Plant:
         return np.array(list(self._s.warm))
 
     @property
+    def integrals(self) -> tuple[float, float]:
+        """Of the position loops, N and N m."""
+        return float(self._s.integral[0]), float(self._s.integral[1])
+
+    @property
     def counts(self) -> tuple[int, int]:
         """Of the encoders, along and around."""
         return int(self._s.count[0]), int(self._s.count[1])
@@ -169,7 +174,7 @@ def slopes(known: Map, x: float, angle: float) -> tuple[Array, Array, Array]:
 
 def distribute(control: ControlParams, x: float, angle: float, force: float, torque: float,
                pair: tuple[int, int] = (-1, -1)) -> tuple[Array, Array, tuple[int, int], int]:  # fmt: skip
-    """One distribution by the controller's map: references of six currents, (force, torque) they give by it, the pair, flags."""
+    """One distribution by the controller's map: references of six currents, (force, torque) by it, the pair, flags."""
     c = _ffi.new("rlsrm_control *")
     _fill(c, control)
     _, along, around = slopes(control.map, x, angle)
@@ -184,7 +189,8 @@ def distribute(control: ControlParams, x: float, angle: float, force: float, tor
 
 def rubbed(params: PlantParams, rates: Array, force: Array, seconds: float) -> Array:
     """Rates (x, angle) after a kick with friction, for tests."""
-    p, s = _ffi.new("rlsrm_params *"), _ffi.new("rlsrm_state *")
+    p: Any = _ffi.new("rlsrm_params *")
+    s: Any = _ffi.new("rlsrm_state *")
     _fill(p, params)
     s.v[0:2] = [float(x) for x in rates]
     _lib.rlsrm_rub_once(p, s, seconds, _ffi.new("double[2]", [float(x) for x in force]))
