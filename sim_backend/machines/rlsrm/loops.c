@@ -1,21 +1,46 @@
-/* The controller, once a millisecond: counts are read, set points go on, position loops ask for force and torque, which are shared
- * out. A loop: kp e + integral + kd d, d the difference of the error through a filter of first order. An integrator waits while a
- * set point is sent to its target, and takes nothing in that its limit or the distribution does not give. */
+/* The controller, once a millisecond: counts are read, set points go on, position loops ask for force and torque, which are
+ * shared out. A loop: kp e + integral + kd d, d the difference of the error through a filter of first order. An integrator waits
+ * while a set point is sent to its target, and takes nothing in that its limit or the distribution does not give. */
 #include <math.h>
 #include <string.h>
 #include "rlsrm.h"
 #include "numbers.h"
 
 /* the encoders count where the edges are; the rotary one sits off its axis, the linear one's scale is off */
+static double seen(const rlsrm_params *p, const rlsrm_state *st, int axis) {
+    if (axis == X) return st->q[X] * (1 + p->scale);
+    return st->q[ANGLE] + p->once * sin(st->q[ANGLE] - p->once_phase);
+}
+
+int64_t rlsrm_counted(const rlsrm_params *p, const rlsrm_state *st, int k) {
+    return (int64_t)floor(seen(p, st, k) / p->pitch[k] + p->edge[k] + (p->truncate[k] != 0 ? 0 : 0.5));
+}
+
+static int64_t below(int64_t a, int64_t every) { return a / every - (a % every < 0); }
+
+/* a mark that goes by between two readings is latched with its count; the rotary one comes once a turn */
+static void mark(const rlsrm_params *p, rlsrm_state *st, int k, int64_t from, int64_t to) {
+    int64_t at = (int64_t)p->mark[k] - st->base[k], low = from < to ? from : to, high = from < to ? to : from;
+    if (k == ANGLE) {
+        int64_t turn = (int64_t)floor(TWO_PI / p->pitch[k] + 0.5);
+        at += turn * below(high - at, turn);
+    }
+    if (low == high || at <= low || at > high) return;
+    st->home[k] = at;
+    st->mark_seen[k] = 1;
+}
+
 static void read_counts(const rlsrm_params *p, const rlsrm_control *c, rlsrm_state *st) {
-    double at[2] = {st->q[X] * (1 + p->scale), st->q[ANGLE] + p->once * sin(st->q[ANGLE] - p->once_phase)};
     for (int k = 0; k < 2; k++) {
         if (p->pitch[k] == 0) {
-            st->read[k] = at[k];
+            st->read[k] = seen(p, st, k);
             continue;
         }
-        st->count[k] = (int64_t)floor(at[k] / p->pitch[k] + p->edge[k] + (p->truncate[k] != 0 ? 0 : 0.5));
-        st->read[k] = (double)st->count[k] * c->pitch[k];
+        int64_t count = rlsrm_counted(p, st, k) - st->base[k];
+        if (st->mode == RLSRM_HOMING && !st->homed[k]) mark(p, st, k, st->count[k], count);
+        st->rate_read[k] = (double)(count - st->count[k]) * c->pitch[k] / LOOP_S;
+        st->count[k] = count;
+        st->read[k] = (double)(count - st->home[k]) * c->pitch[k];
     }
 }
 
@@ -70,8 +95,9 @@ void rlsrm_loops(const rlsrm_params *p, const rlsrm_control *c, const rlsrm_read
     double g[PHASES], along[PHASES], around[PHASES], want[2] = {0}, grown[2] = {0};
     double t = (double)(st->tick - st->wave_start) * RLSRM_TICK;
     read_counts(p, c, st);
+    rlsrm_supervise(p, c, st);
     for (int k = 0; k < 2; k++) {
-        refer(c, st, k, wave(c, k, t));
+        refer(c, st, k, st->mode == RLSRM_OFF || (st->waves && c->wave[k] != 0) ? wave(c, k, t) : st->target[k]);
         if (st->loop[k]) want[k] = wanted(c, st, k, &grown[k]);
         st->asked[k] = clip(want[k], -c->limit[k], c->limit[k]);
     }

@@ -1,8 +1,9 @@
 /* The mover. M x'' = F - D x' - friction + outer, J angle'' = T - K angle' - friction + outer, a bumper at both ends.
  * The bearing's balls roll and slip along one path, so there is one Coulomb force along the velocity of the shaft's surface
  * s = (x', r angle'): -coulomb s/|s|. Turning therefore takes friction off the axis along, and the other way round.
- * A kick over a time h is implicit: with the rates s_0 that there would be without friction and the compliances w (what an impulse
- * of 1 N s gives), s = s_0 - w h coulomb s/|s|, or rest if the impulse that is needed, s_0/w, is less than h coulomb. For n = |s|
+ * A kick over a time h is implicit: with the rates s_0 that there would be without friction and the compliances w (what an
+ * impulse of 1 N s gives), s = s_0 - w h coulomb s/|s|, or rest if the impulse that is needed, s_0/w, is less than h coulomb.
+ * For n = |s|
  *   sum (s_0k/(n + w_k h coulomb))^2 = 1,
  * where the left side S^2 falls; 1/S is all but straight, and Newton on it starts below the root at |s_0| - max w h coulomb. */
 #include <math.h>

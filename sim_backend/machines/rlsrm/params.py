@@ -77,6 +77,7 @@ class PlantParams:
     scale: float = 0.0  # of the linear encoder
     once: float = 0.0  # rad, of the rotary one, once per turn
     once_phase: float = 0.0  # rad
+    mark: Pair = (0.0, 0.0)  # counts from the zero: the encoders' marks, around once a turn
     substeps: float = 1.0  # of an amplifier's tick
 
 
@@ -116,3 +117,12 @@ class ControlParams:
     ki_i: float = 4e4  # V/(A s)
     resistance: float = 7.8  # ohm, fed forward
     late: float = 2.0  # ticks from a reading to its currents' references
+    home_current: Pair = (6.0, 4.0)  # A, along and around; stand-ins, as what follows
+    home_s: Pair = (2.0, 0.5)  # of a step of homing
+    home_rate: float = 0.05  # m/s, at most along
+    safe_holds: float = 0.0  # after MAKE_SAFE 1: held, 0: without currents
+    trip_A: float = 8.0
+    trip_m: float = 14.5e-3
+    trip_rate: Pair = (0.5, 60.0)  # m/s, rad/s, by the difference of two readings
+    trip_warm: float = 120.0  # degrees C
+    watchdog_s: float = 0.08

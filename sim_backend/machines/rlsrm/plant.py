@@ -18,9 +18,14 @@ TRACE: Final = (
     *AXES, *(f"true_{n}" for n in AXES), *(f"rate_{n}" for n in AXES), *(f"ref_{n}" for n in AXES),
     "asked_force", "asked_torque", "given_force", "given_torque", "force", "torque",
     *(f"i_{n}" for n in PHASES), *(f"u_{n}" for n in PHASES), *(f"wanted_{n}" for n in PHASES), "pair", "flags", "changes",
+    "state", "fault", "heard",
 )  # fmt: skip
 """Of one tick: readings, true places and rates, set points; what the loops ask, what the distribution gives by the controller's
-map, what acts; currents, voltages of the tick before, references; pair as 6 a + b, flags, changes of the pair so far."""
+map, what acts; currents, voltages of the tick before, references; pair as 6 a + b, flags, changes of the pair so far;
+state, fault, how long ago the last heartbeat was, s, -1 while none is waited for."""
+STATES: Final = ("OFF", "READY", "HOMING", "HOLDING", "MOVING", "STOPPING", "FAULT")
+COMMANDS: Final = ("ready", "home", "hold", "play", "stop", "safe", "off", "clear")
+FAULTS: Final = ("NONE", "OVERCURRENT", "OVERSPEED", "STROKE", "OVERTEMPERATURE", "HEARTBEAT_LOST")
 LIMITED, NO_PAIR = 1, 2
 
 _ffi, _lib = open_core(Path(__file__).with_name("rlsrm.h"))
@@ -64,7 +69,7 @@ class Plant:
         fill(self._c.map, vars(known))
 
     def switch(self, *, on: bool | None = None, x: bool | None = None, angle: bool | None = None) -> None:
-        """Switch the amplifiers and the position loops; a loop begins without integral and slope."""
+        """Switch the amplifiers and the position loops while it is OFF; a loop begins without integral and slope."""
         if on is not None:
             self._s.on = int(on)
         for k, closed in enumerate((x, angle)):
@@ -72,6 +77,33 @@ class Plant:
                 self._s.loop[k] = int(closed)
                 self._s.integral[k] = self._s.slope[k] = 0.0
                 self._s.fresh = 1
+
+    def command(self, name: str) -> int:
+        """Give the controller a command: 0 done, 1 not in this state, 2 the zeros are not known."""
+        return int(_lib.rlsrm_command(self._c, self._s, COMMANDS.index(name)))
+
+    def power_on(self) -> None:
+        """The controller starts anew: OFF, and counters at zero wherever the mover stands."""
+        _lib.rlsrm_power_on(self._p, self._s)
+
+    def beat(self) -> None:
+        """A heartbeat of the host."""
+        self._s.heard = self._s.tick
+
+    @property
+    def state(self) -> str:
+        """Of the controller."""
+        return STATES[self._s.mode]
+
+    @property
+    def fault(self) -> str:
+        """What tripped."""
+        return FAULTS[self._s.fault]
+
+    @property
+    def homed(self) -> tuple[bool, bool]:
+        """Whether the zeros along and around are known."""
+        return bool(self._s.homed[0]), bool(self._s.homed[1])
 
     def drive(self, amperes: Array) -> None:
         """References of the six currents while no loop is closed."""
@@ -93,7 +125,7 @@ class Plant:
         """Send set points somewhere: with the speed and rise that are set, or at once."""
         for k, value in enumerate((x, angle)):
             if value is not None:
-                self._c.wave[k], self._c.offset[k] = 0.0, value
+                self._c.wave[k], self._c.offset[k], self._s.target[k] = 0.0, value, value
 
     def push(self, newtons: float = 0.0, newton_metres: float = 0.0) -> None:
         """What acts from outside from now on, along +x and +angle."""

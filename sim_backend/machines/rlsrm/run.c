@@ -9,12 +9,14 @@ void rlsrm_start(const rlsrm_params *p, rlsrm_state *st) {
     memset(st, 0, sizeof *st);
     st->fresh = 1;
     st->pending = -1;
+    st->heard = -1;
+    st->homed[X] = st->homed[ANGLE] = 1;
     st->pair[0] = st->pair[1] = -1;
     for (int k = 0; k < PHASES; k++) st->warm[k] = p->ambient;
 }
 
 /* readings, truth and its rates, set points, what loops ask and the distribution gives by its map, what acts; currents, voltages;
- * their references; pair as 6 a + b, flags, changes of the pair */
+ * their references; pair as 6 a + b, flags, changes of the pair; state, fault, age of the heartbeat */
 static void tell(const rlsrm_state *st, double *out) {
     for (int k = 0; k < 2; k++) {
         out[k] = st->read[k];
@@ -31,6 +33,9 @@ static void tell(const rlsrm_state *st, double *out) {
     out[32] = 6 * st->pair[0] + st->pair[1];
     out[33] = st->flags;
     out[34] = (double)st->changes;
+    out[35] = st->mode;
+    out[36] = st->fault;
+    out[37] = st->heard >= 0 ? (double)(st->tick - st->heard) * RLSRM_TICK : -1;
 }
 
 /* means over a period, and what copper has warmed by them */
