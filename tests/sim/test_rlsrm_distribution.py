@@ -197,6 +197,26 @@ def test_a_limit_takes_off_both_or_the_axis_that_matters_less() -> None:
         assert torque[0].max() <= 6 + 1e-9
 
 
+def test_what_6_A_can_give() -> None:
+    """Least over the angle, the other axis zero. A force: where a phase is aligned it acts alone, 16.19 A^2 times 0.7855 H/m."""
+
+    def most_force(x: float, angle: float) -> float:
+        _, g, t = slopes(Map(), x, angle)
+        top, best = float(q_of(np.array(6.0))), 0.0
+        for a in range(6):
+            for b in range(a + 1, 6):
+                q = np.array([-t[b], t[a]]) * (1 if t[a] * g[b] - g[a] * t[b] > 0 else -1)
+                if (q >= 0).all() and q.max() > 0:
+                    best = max(best, top / q.max() * float(g[[a, b]] @ q))
+        return best
+
+    assert min(most_force(0.0, d * DEG) for d in range(90)) == pytest.approx(16.19 * 0.7855, abs=0.01)
+    for degrees in range(0, 90, 7):
+        asked = distribute(replace(ANY, priority=2.0), 0.0, degrees * DEG, 50.0, 0.0)
+        assert asked[1][0] <= most_force(0.0, degrees * DEG) * (1 + 1e-9)
+        assert abs(asked[1][1]) < 1e-9
+
+
 def test_the_share_of_the_other_axis_is_the_largest_there_is() -> None:
     """By trying: a hair more than the share that priority gives needs more than 6 A in every pair."""
     x, angle, top = 0.004, 0.7, float(q_of(np.array(6.0)))

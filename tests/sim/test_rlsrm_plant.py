@@ -283,6 +283,8 @@ def test_defects_of_amplifiers_are_where_they_are_planted() -> None:
     reads = driven(off, {"A1": 3.3, "B1": 2.0})
     reads.run(0.05, 0)
     assert reads.currents == pytest.approx([3.0, 1.98, 0, 0, 0, 0], abs=1e-5)
+    assert reads.means == pytest.approx([3.3, 2.0, 0, 0, 0, 0], abs=1e-5)
+    assert crossed.means == pytest.approx([0, 3, 0, 0, 0, 0], abs=1e-5)
 
 
 def test_a_brake_holds_one_axis_and_leaves_the_other() -> None:

@@ -64,10 +64,6 @@ class Plant:
         else:
             getattr(self._c, name)[AXES.index(axis)] = value
 
-    def teach(self, known: Map) -> None:
-        """Give the controller a map."""
-        fill(self._c.map, vars(known))
-
     def switch(self, *, on: bool | None = None, x: bool | None = None, angle: bool | None = None) -> None:
         """Switch the amplifiers and the position loops while it is OFF; a loop begins without integral and slope."""
         if on is not None:
@@ -109,10 +105,6 @@ class Plant:
         """References of the six currents while no loop is closed."""
         self._s.manual[0:6] = [float(x) for x in amperes]
 
-    def begin_waves(self) -> None:
-        """Waves of the set points count their time from now."""
-        self._s.wave_start = self._s.tick
-
     def put(self, x: float | None = None, angle: float | None = None, x_rate: float | None = None,
             angle_rate: float | None = None) -> None:  # fmt: skip
         """Put the mover somewhere, for tests."""
@@ -153,8 +145,11 @@ class Plant:
 
     @property
     def means(self) -> Array:
-        """Currents in the mean over the last millisecond, A."""
-        return np.array(list(self._s.mean))
+        """Currents in the mean over the last millisecond as the six amplifiers read them, A."""
+        p, mean = self.params, np.array(list(self._s.mean))
+        led = mean[[int(k) for k in p.wired]]
+        offset = np.where(np.array(list(self._s.wanted)) > 0, p.current_offset, 0.0)
+        return np.asarray(np.array(p.current_gain) * led + offset)
 
     @property
     def warmth(self) -> Array:
