@@ -198,7 +198,7 @@ def test_a_limit_takes_off_both_or_the_axis_that_matters_less() -> None:
 
 
 def test_what_6_A_can_give() -> None:
-    """Least over the angle, the other axis zero. A force: where a phase is aligned it acts alone, 16.19 A^2 times 0.7855 H/m."""
+    """Least over the angle, the other axis zero: where a phase is aligned it acts alone: 16.19 A^2 times 0.7855 H/m."""
 
     def most_force(x: float, angle: float) -> float:
         _, g, t = slopes(Map(), x, angle)
