@@ -1,0 +1,101 @@
+/* Time: ticks of 50 us of the amplifiers, in each of which voltages are held; every twentieth the controller. A step is half a
+ * kick of the mover, its way, currents and forces where it is then, and the other half: the second order of both halves. */
+#include <math.h>
+#include <string.h>
+#include "rlsrm.h"
+#include "numbers.h"
+
+void rlsrm_start(const rlsrm_params *p, rlsrm_state *st) {
+    memset(st, 0, sizeof *st);
+    st->fresh = 1;
+    st->pending = -1;
+    st->heard = -1;
+    st->homed[X] = st->homed[ANGLE] = 1;
+    st->pair[0] = st->pair[1] = -1;
+    for (int k = 0; k < PHASES; k++) st->warm[k] = p->ambient;
+}
+
+/* readings, truth and its rates, set points, what loops ask and the distribution gives by its map, what acts; currents, voltages;
+ * their references; pair as 6 a + b, flags, changes of the pair; state, fault, age of the heartbeat */
+static void tell(const rlsrm_state *st, double *out) {
+    for (int k = 0; k < 2; k++) {
+        out[k] = st->read[k];
+        out[2 + k] = st->q[k];
+        out[4 + k] = st->v[k];
+        out[6 + k] = st->ref[k];
+        out[8 + k] = st->asked[k];
+        out[10 + k] = st->given[k];
+        out[12 + k] = st->force[k];
+    }
+    memcpy(out + 14, st->i, sizeof st->i);
+    memcpy(out + 20, st->u, sizeof st->u);
+    memcpy(out + 26, st->wanted, sizeof st->wanted);
+    out[32] = 6 * st->pair[0] + st->pair[1];
+    out[33] = st->flags;
+    out[34] = (double)st->changes;
+    out[35] = st->mode;
+    out[36] = st->fault;
+    out[37] = st->heard >= 0 ? (double)(st->tick - st->heard) * RLSRM_TICK : -1;
+}
+
+/* means over a period, and what copper has warmed by them */
+static void end_period(const rlsrm_params *p, rlsrm_state *st) {
+    for (int k = 0; k < PHASES; k++) {
+        st->mean[k] = st->running[k] / LOOP_TICKS;
+        st->square[k] = st->running_square[k] / LOOP_TICKS;
+        st->running[k] = st->running_square[k] = 0;
+        double heat = p->resistance[k] * (1 + p->copper * (st->warm[k] - 20)) * st->square[k];
+        st->warm[k] += LOOP_S / p->thermal_capacity * (heat - (st->warm[k] - p->ambient) / p->thermal_resistance);
+    }
+}
+
+static INLINE void kick(const rlsrm_params *p, const rlsrm_mover *m, rlsrm_state *st) {
+    double outer = rlsrm_stop(p, st) + p->push[X] + p->mass * p->gravity * p->tilt;
+    double force[2] = {st->force[X] + outer, st->force[ANGLE] + p->push[ANGLE]};
+    rlsrm_kick(p, m, st, force);
+}
+
+static INLINE void tick(const rlsrm_params *p, const rlsrm_control *c, const rlsrm_ready *map, const rlsrm_mover *half, int steps,
+                        rlsrm_state *st) {
+    double before[PHASES], u[PHASES], seconds = 2 * half->seconds;
+    if (st->pending >= 0 && st->pending-- == 0) memcpy(st->wanted, st->next, sizeof st->wanted);
+    rlsrm_amplifiers(p, c, st, u);
+    for (int n = 0; n < steps; n++) {
+        kick(p, half, st);
+        for (int k = 0; k < 2; k++) st->q[k] += seconds * st->v[k];
+        memcpy(before, st->g, sizeof before);
+        memcpy(st->u, u, sizeof u);
+        rlsrm_look(map, st->q, st->g, st->along, st->around);
+        rlsrm_currents(p, st, before, st->u, seconds);
+        rlsrm_forces(p, st);
+        kick(p, half, st);
+    }
+    for (int k = 0; k < PHASES; k++) {
+        st->running[k] += st->i[k];
+        st->running_square[k] += st->i[k] * st->i[k];
+    }
+}
+
+int64_t rlsrm_run(const rlsrm_params *p, const rlsrm_control *c, rlsrm_state *st, int64_t ticks, double *trace, int64_t every) {
+    int64_t rows = 0;
+    int steps = (int)most(p->substeps, 1);
+    rlsrm_ready truth, believed;
+    rlsrm_mover half;
+    rlsrm_make_ready(&p->map, &truth);
+    rlsrm_make_ready(&c->map, &believed);
+    rlsrm_ready_mover(p, 0.5 * RLSRM_TICK / steps, &half);
+    rlsrm_look(&truth, st->q, st->g, st->along, st->around);
+    rlsrm_forces(p, st);
+    for (int64_t n = 0; n < ticks; n++) {
+        if (st->tick % LOOP_TICKS == 0) rlsrm_loops(p, c, &believed, st);
+        if (every && st->tick % every == 0) {
+            tell(st, trace);
+            trace += RLSRM_TRACE;
+            rows++;
+        }
+        tick(p, c, &truth, &half, steps, st);
+        st->tick++;
+        if (st->tick % LOOP_TICKS == 0) end_period(p, st);
+    }
+    return rows;
+}
