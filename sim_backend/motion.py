@@ -215,8 +215,8 @@ class LoopsAsked:
 @dataclass(frozen=True)
 class GateAsked:
     """A levitated mover at rest, looked at for `windows` times the gate's time `gate_s` at each of the `places`, by name m and
-    rad; `settings` as those of steps, the parameters of the set points `place` and `angle`; the gate, m. Where catch margins are
-    asked for, by probe: the controller's greatest force, N."""
+    rad; `settings` as those of steps, the parameters of the set points `place` and `angle`; the gate, m. `limits`: by probe
+    whose catch margin is asked for, the controller's greatest force, N."""
 
     settings: Numbers
     places: Mapping[str, tuple[float, float]]

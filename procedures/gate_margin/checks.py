@@ -24,19 +24,26 @@ TAILS = 0.15  # of the mean largest reading: more than rounding and a slow motio
 def of_trials(trials: Sequence[Trial], gate_m: float, rig: RigFile, plan: Plan) -> Iterator[Finding]:
     """A gate that passed while a probe was beyond it; probes on which that was not tried."""
     if not plan.trial or not motion(rig).radial:
-        why = "the plan leaves it out" if not plan.trial else "the rig file's capabilities.motion tells no radial set points"
+        why = (
+            "the plan leaves it out"
+            if not plan.trial
+            else "the rig file's capabilities.motion tells no radial set points"
+        )
         yield Finding("gate-not-tried", f"which readings the gate watches was not tried: {why}.", "")
         return
     passed = [t for t in trials if HELD in [rig.binding.mode(s) for s in t.states]]
     for t in passed:
         if t.pulsed:
             text = (f"the controller counted as levitated while {t.probe} went {t.farthest * UM:.1f} µm off every "
-                    f"{_between(plan, rig):.2g} s, {gate_m * UM:.3g} µm allowed: it looks at readings that are filtered, and single "
+                    f"{_between(plan, rig):.2g} s, {gate_m * UM:.3g} µm allowed: it looks at readings that are "
+                    "filtered, and single "
                     "ones that the margin counts do not keep it shut.")  # fmt: skip
             yield Finding("gate-filtered", text, t.probe, Effect.INDETERMINATE, (GATE,))
         else:
-            text = (f"the controller counted as levitated while {t.probe} stood {t.nearest * UM:.1f} to {t.farthest * UM:.1f} µm "
-                    f"off, {gate_m * UM:.3g} µm allowed: its gate does not watch {t.probe}. Further probes were not tried.")  # fmt: skip
+            text = (f"the controller counted as levitated while {t.probe} stood {t.nearest * UM:.1f} to "
+                    f"{t.farthest * UM:.1f} µm "
+                    f"off, {gate_m * UM:.3g} µm allowed: its gate does not watch {t.probe}. Further probes were not "
+                    "tried.")  # fmt: skip
             yield Finding("gate-unwatched", text, t.probe, Effect.INDETERMINATE, (GATE,))
     weak = [t for t in trials if t not in passed and (t.farthest if t.pulsed else t.nearest) <= gate_m]
     tried = {t.probe for t in trials if t not in weak}
@@ -63,7 +70,8 @@ def of_signals(taken: Sequence[Taken], gate: tuple[float, float], rig: RigFile, 
     if short or not all(t.step_s for t in taken):
         worst = next((t for t in taken if not t.step_s), short[0] if short else taken[0])
         text = (f"at {len(short)} of {len(taken)} places the windows were not captured. Telemetry reads up to "
-                f"{worst.telemetry * UM:.2f} µm, but leaves readings out: {(gate[0] - worst.telemetry) * UM:.2f} µm is a bound of the "
+                f"{worst.telemetry * UM:.2f} µm, but leaves readings out: {(gate[0] - worst.telemetry) * UM:.2f} µm "
+                "is a bound of the "
                 "margin from above, and no margin.")  # fmt: skip
         yield Finding("windows-not-captured", text, worst.place.name, Effect.ERROR)
         return
@@ -84,7 +92,8 @@ def _drift(t: Taken, gate_s: float, rig: RigFile, plan: Plan) -> Iterator[Findin
     moved = np.abs(means[-third:].mean(axis=0) - means[:third].mean(axis=0))
     k = int(np.argmax(moved))
     if moved[k] > plan.max_drift_m:
-        text = (f"{list(radial(rig))[k]} drifts by {moved[k] * UM:.2f} µm over the windows, {plan.max_drift_m * UM:.3g} µm allowed. "
+        text = (f"{list(radial(rig))[k]} drifts by {moved[k] * UM:.2f} µm over the windows, "
+                f"{plan.max_drift_m * UM:.3g} µm allowed. "
                 "Settle longer.")  # fmt: skip
         yield Finding("unsettled", text, t.place.name, Effect.INDETERMINATE, (f"{GATE}@{t.place.name}", CATCH))
 
@@ -95,20 +104,24 @@ def of_results(found: Results, rig: RigFile) -> Iterator[Finding]:
     for k, x in enumerate(found.looked):
         others = float(np.mean(np.delete(scatters, k))) if len(scatters) > 1 else scatters[k]
         if scatters[k] > MORE**2 * others and np.ptp(x.largest) > 4 * _count(rig):
-            text = (f"largest readings of {len(x.largest)} windows are {x.largest.min() * UM:.2f} to {x.largest.max() * UM:.2f} µm, "
+            text = (f"largest readings of {len(x.largest)} windows are {x.largest.min() * UM:.2f} to "
+                    f"{x.largest.max() * UM:.2f} µm, "
                     f"{MORE:g} times as far apart as elsewhere: something comes and goes there.")  # fmt: skip
             yield Finding("windows-differ", text, x.taken.place.name, Effect.INDETERMINATE,
                           (f"{GATE}@{x.taken.place.name}",))  # fmt: skip
         mean = float(x.largest.mean())
         if mean > x.normal * (1 + TAILS) + _count(rig):
-            text = (f"the largest reading is {mean * UM:.2f} µm in the mean, {x.normal * UM:.2f} µm for normal noise of its size: single "
+            text = (f"the largest reading is {mean * UM:.2f} µm in the mean, {x.normal * UM:.2f} µm for normal "
+                    "noise of its size: single "
                     "readings that stand out, which count all the same.")  # fmt: skip
             yield Finding("noise-not-normal", text, x.taken.place.name)
     top = max(found.looked, key=lambda x: float(x.largest.max()))
     count = sum(len(x.largest) for x in found.looked)
     told = max(x.taken.telemetry for x in found.looked)
-    text = (f"of {count} windows of {found.gate_s * 1e3:g} ms the largest single reading is {top.largest.max() * UM:.2f} µm, at "
-            f"{top.taken.place.name}; telemetry shows {told * UM:.2f} µm. A margin is that of one window in the mean: the largest reading of a "
+    text = (f"of {count} windows of {found.gate_s * 1e3:g} ms the largest single reading is "
+            f"{top.largest.max() * UM:.2f} µm, at "
+            f"{top.taken.place.name}; telemetry shows {told * UM:.2f} µm. A margin is that of one window in the "
+            "mean: the largest reading of a "
             "longer time is greater.")  # fmt: skip
     yield Finding("largest-reading", text)
 

@@ -133,12 +133,11 @@ def _caught(
     k = int(np.argmin(reach - excursion))
     scatter = Influence(f"scatter/{CATCH}/{plane.probe}", "scatter of the current at rest", u[k], "A", "A", "normal",
                         float(plan.windows - 1), source="windows")  # fmt: skip
-    left = Influence(f"excursion/{plane.probe}", "noise in how far the shaft goes at rest", NEAR * excursion[k] / math.sqrt(3), "m",
-                     "B", "rectangular", source="docs/reference/gate-margin.md")  # fmt: skip
+    left = Influence(f"excursion/{plane.probe}", "noise in how far the shaft goes at rest",
+                     NEAR * excursion[k] / math.sqrt(3), "m", "B", "rectangular",
+                     source="docs/reference/gate-margin.md")  # fmt: skip
     room = Estimate.of(spare[k], scatter)
     return Caught(plane, reach, excursion), room * ratio - Estimate.of(excursion[k], left)
-
-
 
 
 def weight_of(plane: Plane, rig: RigFile) -> float:

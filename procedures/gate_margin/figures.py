@@ -45,7 +45,8 @@ def _over_places(found: Results) -> Figure:
         series.append(Series(f"z {place * 1e3:g} mm, mean of the windows", _degrees(found, some), means, "both"))
         worst = np.array([found.looked[k].largest.max() for k in some]) * UM
         series.append(Series("", _degrees(found, some), worst, "mark"))
-    caption = (f"Largest |reading| of all radial probes in {found.gate_s * 1e3:g} ms, at each place: mean of the windows, and as a dot the "
+    caption = (f"Largest |reading| of all radial probes in {found.gate_s * 1e3:g} ms, at each place: mean of the "
+               "windows, and as a dot the "
                "largest of all. The gate passes below its line.")  # fmt: skip
     return Figure("gate", "Largest readings over the places", caption, "angle / °", "largest reading / µm", tuple(series),
                   lines=(("gate", found.gate_m * UM),))  # fmt: skip
@@ -62,18 +63,19 @@ def _histogram(x: Looked, found: Results, rig: RigFile) -> Figure:
         series.append(Series(probe, values * step * UM, np.log10(many * n / len(counts)), "both"))
     top = float(x.largest.max())
     notes = ((f"largest of {len(x.largest)} windows: {top * UM:.2f} µm", top * UM, 0.0),)
-    caption = (f"How often each probe reads what, at {x.taken.place.name}, in one window in the mean (its decimal logarithm): where a curve goes "
-               f"through 0 one reading of a window is. Normal noise of this size has {x.normal * UM:.2f} µm as its largest.")  # fmt: skip
+    caption = (f"How often each probe reads what, at {x.taken.place.name}, in one window in the mean (its decimal "
+               "logarithm): where a curve goes "
+               f"through 0 one reading of a window is. Normal noise of this size has {x.normal * UM:.2f} µm as its "
+               "largest.")  # fmt: skip
     return Figure("readings", "Readings and their extremes", caption, "reading / µm", "log10 of the number of readings",
                   tuple(series), notes=notes)  # fmt: skip
 
 
 def _catch(found: Results) -> Figure:
-    series = []
     x = np.arange(float(len(found.looked)))
-    for c in found.caught:
-        series.append(Series(c.plane.probe, x, (c.reach - c.excursion) * UM, "both"))
-    caption = ("What the bearings hold, from where the shaft rests and less how far it went from there: of each probe's plane and axis, by place. "
+    series = [Series(c.plane.probe, x, (c.reach - c.excursion) * UM, "both") for c in found.caught]
+    caption = ("What the bearings hold, from where the shaft rests and less how far it went from there: of each "
+               "probe's plane and axis, by place. "
                "It is less where the magnets' middle is farther off.")  # fmt: skip
     ticks = tuple((look.taken.place.name, float(k)) for k, look in enumerate(found.looked))
     return Figure("catch", "What the catch has to spare", caption, "place", "catch margin / µm", tuple(series),

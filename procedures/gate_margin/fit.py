@@ -25,7 +25,7 @@ def largest(readings: Array, samples: int) -> Array:
 
 def normal_largest(means: Array, deviations: Array, samples: int) -> float:
     """Mean of the largest |reading| of so many independent normal ones of each channel: the integral over x of
-    1 - prod_k (1 - P(|r_k| > x))^n. Of one channel without a mean and n = 4 * 8750 it is 4.26 standard deviations."""
+    1 - prod_k (1 - P(|r_k| > x))^n. Of one channel without a mean and n = 4 * 8750 it is 4.31 standard deviations."""
     from scipy import special
 
     top = float(np.abs(means).max() + 9 * deviations.max())
@@ -39,7 +39,7 @@ def normal_largest(means: Array, deviations: Array, samples: int) -> float:
 def excursions(
     reading: Array, current: Array, samples: int, step_s: float, smooth_s: float, pole: float, per_ampere: float
 ) -> Array:
-    """Of each window (w,) the largest |x| + |v|/lambda about where the shaft stands: what leaves by e^(lambda t) is x + v/lambda.
+    """Of each window (w,) the largest |x| + |v|/lambda about where the shaft stands: x + v/lambda grows by e^(lambda t).
 
     Slow motion is that of the reading under a Gauss window, which takes the converter's noise off its rate. What is faster is
     driven by the current, `per_ampere` K_B/m in m/s^2: x'' = lambda^2 x + (K_B/m) i; of its integral that part is taken which

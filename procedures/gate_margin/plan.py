@@ -19,7 +19,9 @@ class Plan(BenchPlan):
     places_m: tuple[float, ...] = Field((8e-3, 11e-3, 14e-3), min_length=1)
     angles_rad: tuple[float, ...] = Field(tuple(math.radians(a) for a in TURNED), min_length=1)
     windows: int = Field(10, ge=9)  # at each place, each of the gate's time
-    settle_s: float = Field(1.0, ge=0.1)  # after a move: radial integrators forget within 74 ms, that of an angle in 0.25 s
+    settle_s: float = Field(
+        1.0, ge=0.1
+    )  # after a move: radial integrators forget within 74 ms, that of an angle in 0.25 s
     trial: bool = True  # lift with one probe after the other beyond the gate: it must not pass
     trial_share: float = Field(1.2, gt=1)  # of the gate, that a set point goes to
     trial_gates: float = Field(1.6, ge=1.2)  # of the gate's time, that it stays there

@@ -40,9 +40,11 @@ from procedures.gate_margin.plan import Plan
 from procedures.gate_margin.steps import STATE, read_taken, read_trials
 from procedures.shared import assumptions
 
-MARGIN = Quantity("gate_margin", "m", "gate less the largest radial reading in one of its times, noise included, mean over such times",
+MARGIN = Quantity("gate_margin", "m", "gate less the largest radial reading in one of its times, noise included, "
+                                      "mean over such times",
                   title="gate margin")  # fmt: skip
-CATCH = Quantity("catch_margin", "m", "how far the force holds the pull beyond where the shaft rests, less how far it goes; least place",
+CATCH = Quantity("catch_margin", "m", "how far the force holds the pull beyond where the shaft rests, less how far "
+                                      "it goes; least place",
                  title="catch margin")  # fmt: skip
 MEASURES = (MARGIN, CATCH)
 POLE = "unstable-pole"
@@ -127,7 +129,10 @@ def _ramp(rig: Rig, parameter: str, beyond: float, seconds: float) -> None:
 def _sides(rig: Rig) -> dict[str, float]:
     """To which side each probe is sent: to where its magnets' middle is, so that the least is asked of the bearings. At rest
     K x = -K_B i: it is where the current, less the weight's, pushes. A wrong sign of a small current costs little."""
-    out, told = dict.fromkeys(motion(rig.file).radial, 1.0), [p for p in planes(rig.file) if p.current in rig.file.channels]
+    out, told = (
+        dict.fromkeys(motion(rig.file).radial, 1.0),
+        [p for p in planes(rig.file) if p.current in rig.file.channels],
+    )
     pushes = dict.fromkeys((p.probe for p in told), 0.0)
     for _ in range(LOOKS if told else 0):
         for p in told:
@@ -196,15 +201,17 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     if len({p.name for p in grid(plan)}) < len(grid(plan)):
         yield "places_m, angles_rad: found one place twice; expected each once"
     if plan.trial:
-        beyond = {parameter: plan.trial_share * gate for parameter in at.radial.values()}
+        beyond = dict.fromkeys(at.radial.values(), plan.trial_share * gate)
         yield from (f"trial_share: {problem}" for problem in envelope.problems_of(beyond))
     period = plan.trial_gates * rig.parameters[at.gate_time].default / plan.pulses
     if plan.trial and not 2 * plan.pulse_s < period < rig.parameters[at.gate_time].default:
-        yield f"pulses: found {plan.pulses}, one every {period:g} s; expected more than two pulse_s and less than the gate's time"
+        yield (f"pulses: found {plan.pulses}, one every {period:g} s; expected more than two pulse_s and less than the "
+               "gate's time")  # fmt: skip
     if rig.capture is not None:
         size = 2 * len(captured(rig)) * rate(rig) * (plan.windows * rig.parameters[at.gate_time].default + SPARE_S)
         if size > rig.capture.memory_bytes:
-            yield f"windows: found {plan.windows}, of {size / 1e6:.0f} MB; the controller keeps {rig.capture.memory_bytes / 1e6:.0f} MB"
+            kept = rig.capture.memory_bytes / 1e6
+            yield f"windows: found {plan.windows}, of {size / 1e6:.0f} MB; the controller keeps {kept:.0f} MB"
 
 
 def figures(found: Results, recording: Recording[Plan]) -> Iterable[Figure]:

@@ -173,7 +173,7 @@ GATE_MARGIN = (
     "The force constant that the controller reckons with is the stated one: one that is 1 % greater makes the bearings' limit, "
     "in amperes, and so every catch margin 1 % less.",
     "Planes that are caught one by one, by forces that come at once. A loop that answers late needs some of it: of a nominal "
-    "machine whose force holds 69.9 µm, releases from rest are caught from 62 µm.",
+    "machine whose force holds 69.9 µm, releases from rest are caught up to 64 to 66 µm.",
 )
 COIL_MAP = (
     "The readings of the angle and of z are right: a share is of what the winding's table gives at these. 1 degree electrical "

@@ -21,8 +21,8 @@ half-bridges of one drive the other; `cables_exchanged`: 100 j + k, coils of two
 after its zero was set; `one_zero`: 1, the firmware takes the zero of the first rotary actuator for both; `adc_late_s`: of the
 half-bridges' readings; `no_pull`: 1, the observers do not know the negative stiffness; `position_sign_*`: of a probe;
 `factor_*`: what the firmware has of a gain or a limit that it was told; `capacitance_factor`: of every capacitor's own;
-`hold_one_plane`: 1, a hold pushes the first plane alone; `hold_deaf`: 1, a hold is answered and does not come; `gate_channels`: bits x1, x2,
-y1, y2 of the radial readings that the gate watches; `gate_lag_s`: of a low-pass before it."""
+`hold_one_plane`: 1, a hold pushes the first plane alone; `hold_deaf`: 1, a hold is answered and does not come; `gate_channels`:
+bits x1, x2, y1, y2 of the radial readings that the gate watches; `gate_lag_s`: of a low-pass before it."""
 REVERSED: Final = (range(0), range(1, 7), range(7, 13), range(13, 16))
 """Coils of each actuator, by its number."""
 OPEN_OHM: Final = 5e3
