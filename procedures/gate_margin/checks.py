@@ -40,10 +40,9 @@ def of_trials(trials: Sequence[Trial], gate_m: float, rig: RigFile, plan: Plan) 
                     "ones that the margin counts do not keep it shut.")  # fmt: skip
             yield Finding("gate-filtered", text, t.probe, Effect.INDETERMINATE, (GATE,))
         else:
-            text = (f"the controller counted as levitated while {t.probe} stood {t.nearest * UM:.1f} to "
-                    f"{t.farthest * UM:.1f} µm "
-                    f"off, {gate_m * UM:.3g} µm allowed: its gate does not watch {t.probe}. Further probes were not "
-                    "tried.")  # fmt: skip
+            stood = f"{t.nearest * UM:.1f} to {t.farthest * UM:.1f} µm off, {gate_m * UM:.3g} µm allowed"
+            text = (f"the controller counted as levitated while {t.probe} stood {stood}: its gate does not watch {t.probe}, or "
+                    "sees it late through a filter. Further probes were not tried.")  # fmt: skip
             yield Finding("gate-unwatched", text, t.probe, Effect.INDETERMINATE, (GATE,))
     weak = [t for t in trials if t not in passed and (t.farthest if t.pulsed else t.nearest) <= gate_m]
     tried = {t.probe for t in trials if t not in weak}

@@ -50,7 +50,7 @@ MEASURES = (MARGIN, CATCH)
 POLE = "unstable-pole"
 SPARE_S = 1e-3  # of a capture
 LOOK_S = 0.01
-LOOKS = 10  # at the currents at rest, before a trial
+LOOKS = 4  # at the currents at rest, before a trial
 RAMP = 4  # writes by which a probe is sent beyond the gate: a step at once asks more of the bearings
 STANDS_M = 2e-5  # along, between two looks: the lift has arrived
 

@@ -38,6 +38,7 @@ GATE = (20e-6, 0.25)
 
 
 def run(folder: Path, truth: Mapping[str, float] | None = None, seed: int = 1, **plan: Any) -> Simulated:
+    folder.mkdir(exist_ok=True)
     return simulated_run(
         "gate-margin",
         "lira",
@@ -83,7 +84,9 @@ def test_how_far_a_shaft_goes(hz: float) -> None:
     current = -(w**2 + pole**2) * x / per_ampere  # x'' = lambda^2 x + k i
     noise = np.random.default_rng(3).normal(0, 0.3e-6, x.size)
     found = fit.excursions(x + noise, current, WINDOW, STEP_S, 6e-4, pole, per_ampere)
-    assert found.mean() == pytest.approx(size * math.hypot(1, w / pole), rel=0.13)
+    assert found.mean() == pytest.approx(
+        size * math.hypot(1, w / pole), abs=0.45e-6
+    )  # noise that is left adds to a largest
 
 
 def released(way: str, start: float, reduced: bool) -> bool:
@@ -134,7 +137,7 @@ def test_margins_are_those_of_the_machine(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("truth", "code", "where"),
-    [({"gate_channels": 3.0}, "gate-unwatched", "y1"), ({"gate_lag_s": 0.1}, "gate-filtered", "y2")],
+    [({"gate_channels": 3.0}, "gate-unwatched", "y1"), ({"gate_lag_s": 0.05}, "gate-filtered", "y2")],
 )
 def test_a_gate_that_does_not_watch_every_reading_as_it_is(
     tmp_path: Path, truth: dict[str, float], code: str, where: str
@@ -142,7 +145,9 @@ def test_a_gate_that_does_not_watch_every_reading_as_it_is(
     done = run(tmp_path, truth)
     (found,) = [r for r in done.results if isinstance(r, Finding) and r.effect is not Effect.NOTE]
     assert (found.code, found.where, found.concerns) == (code, where, ("gate_margin",))
-    assert not strong(run(tmp_path, truth, trial=False))  # nothing else shows it, and a note says that it was not tried
+    assert not strong(
+        run(tmp_path / "untried", truth, trial=False)
+    )  # nothing else shows it, and a note says that it was not tried
 
 
 def test_a_probe_whose_zero_is_off_takes_from_the_catch_and_not_from_the_gate(tmp_path: Path) -> None:
@@ -150,7 +155,7 @@ def test_a_probe_whose_zero_is_off_takes_from_the_catch_and_not_from_the_gate(tm
     truth = {"x1.offset": 20e-6, "magnet_centre_x1": 0.0, "magnet_runout_1": 0.0, "target_runout": 0.0}
     found = {}
     for name, more in (("off", truth), ("sound", {**truth, "x1.offset": 0.0})):
-        done = run(tmp_path, more)
+        done = run(tmp_path / name, more)
         found[name] = {
             f"{r.quantity.name}@{r.where}": r.estimate.value for r in done.results if isinstance(r, Measured)
         }
