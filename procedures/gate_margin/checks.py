@@ -17,6 +17,7 @@ from procedures.shared import signals
 
 UM = 1e6
 HELD = "LEVITATED"
+LIMITED = 2e-3  # share of telemetry's samples
 MORE = 3.0  # times as much scatter of windows as everywhere else
 TAILS = 0.15  # of the mean largest reading: more than rounding and a slow motion make of normal noise
 
@@ -81,6 +82,12 @@ def of_signals(taken: Sequence[Taken], gate: tuple[float, float], rig: RigFile, 
             return
     lost, wanted = np.array([(t.lost, t.expected) for t in taken], dtype=float).T
     yield from signals.losses(lost, wanted, plan.max_lost, lambda share: taken[int(np.argmax(share))].place.name)
+    if worn := [t for t in taken if t.limited > LIMITED]:
+        worst = max(worn, key=lambda t: t.limited)
+        text = (f"at {len(worn)} of {len(taken)} places a bearing's force was at its limit at rest, "
+                f"{worst.limited:.1%} of the time "
+                "in the worst: nothing is to spare then. Noise that drives it so far? Another observer?")  # fmt: skip
+        yield Finding("force-limited", text, worst.place.name, Effect.INDETERMINATE, (GATE, CATCH))
     for t in taken:
         yield from _drift(t, gate[1], rig, plan)
 

@@ -10,6 +10,7 @@ from typing import Any
 from bench.errors import Lacking
 from bench.recording import Recording
 from bench.rigfile import RigFile
+from bench.rigfile.bit import Bit
 from bench.rigfile.capabilities_of_loops import Motion
 from procedures.gate_margin.plan import Plan
 from procedures.shared.rates import rate_of
@@ -83,6 +84,13 @@ def planes(rig: RigFile) -> tuple[Plane, ...]:
         for channel, current, stiffness in zip(axis.positions, axis.currents, axis.stiffness, strict=True)
         if channel in named
     )
+
+
+def limits(rig: RigFile) -> tuple[Bit, ...]:
+    """Bits that say that a bearing's force is at its limit."""
+    can, wanted = rig.capabilities.loop_injection, radial(rig).values()
+    loops = () if can is None else can.loops.values()
+    return tuple(loop.limited for loop in loops if loop.channel in wanted and loop.limited is not None)
 
 
 def captured(rig: RigFile) -> tuple[str, ...]:

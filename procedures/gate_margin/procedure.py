@@ -228,7 +228,7 @@ def requires(rig: RigFile) -> Requires:
         channels=(*probes.values(), at.place_channel, STATE),
         capabilities=("motion", "motion.gate", "motion.gate_time"),
         capture=captured(rig),
-        uses=("settings.observer", "hold"),
+        uses=("settings.observer", "hold", "loop_injection"),
         lacks=() if probes else ("probes: found none across the shaft; expected the radial ones",),
     )
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.recording import Recording, Step
-from procedures.gate_margin.place import TRIAL, WINDOWS, Place, captured, radial
+from procedures.gate_margin.place import TRIAL, WINDOWS, Place, captured, limits, radial
 
 Array = npt.NDArray[np.float64]
 STATE = "state"
@@ -18,13 +18,15 @@ STATE = "state"
 @dataclass(frozen=True)
 class Taken:
     """At one place: `readings` (n, p) m of all radial probes and `currents` by channel (n,) A, every `step_s`; empty without a
-    capture. `telemetry`, the largest |reading| that it shows; states, samples lost and expected."""
+    capture. `telemetry`, the largest |reading| that it shows; `limited`, the share of its samples in which a bearing's force
+    was at its limit; states, samples lost and expected."""
 
     place: Place
     step_s: float
     readings: Array
     currents: dict[str, Array]
     telemetry: float
+    limited: float
     states: tuple[str, ...]
     lost: int
     expected: int
@@ -47,6 +49,16 @@ def _states(recording: Recording[Any], step: Step) -> tuple[str, ...]:
     return tuple(names.get(int(code), str(int(code))) for code in np.unique(step.read(STATE)[STATE]))
 
 
+def _limited(recording: Recording[Any], step: Step) -> float:
+    """0 where the controller does not tell of its limits."""
+    hit = np.zeros(1, bool)
+    for bit in limits(recording.rig):
+        flags = step.read(bit.channel)[bit.channel].astype(np.int64)
+        now = flags != 0 if bit.mask is None else flags & bit.mask != 0
+        hit = now | hit if len(hit) in (1, len(now)) else now
+    return float(hit.mean()) if len(hit) else 0.0
+
+
 def read_taken(recording: Recording[Any]) -> list[Taken]:
     """Every place, in time order."""
     rig, out = recording.rig, []
@@ -62,7 +74,17 @@ def read_taken(recording: Recording[Any]) -> list[Taken]:
             readings = np.column_stack([data[c] for c in probes])
             currents = {c: data[c] for c in captured(rig) if c not in probes}
         out.append(
-            Taken(place, step_s, readings, currents, far, _states(recording, step), step.lost(), step.expected())
+            Taken(
+                place,
+                step_s,
+                readings,
+                currents,
+                far,
+                _limited(recording, step),
+                _states(recording, step),
+                step.lost(),
+                step.expected(),
+            )
         )
     return out
 

@@ -166,7 +166,7 @@ def test_a_probe_whose_zero_is_off_takes_from_the_catch_and_not_from_the_gate(tm
 
 def taken(place: Place, readings: np.ndarray, **of: Any) -> Taken:
     currents = {p.current: np.full(len(readings), 1.0) for p in planes(LIRA)}
-    base = Taken(place, STEP_S, readings, currents, 1e-6, ("LEVITATED",), 0, 1000)
+    base = Taken(place, STEP_S, readings, currents, 1e-6, 0.0, ("LEVITATED",), 0, 1000)
     return replace(base, **of)
 
 
@@ -223,6 +223,12 @@ def test_windows_that_are_not_alike() -> None:
     rest = [taken(p, x) for p, x in zip(places[1:], sound[1:], strict=True)]
     (found_drift,) = checks.of_signals([drifting, *rest], GATE, LIRA, plan)
     assert found_drift.code == "unsettled"
+
+
+def test_a_force_at_its_limit_has_nothing_to_spare() -> None:
+    plan = Plan(places_m=(8e-3,), angles_rad=(0.0,))
+    (found,) = checks.of_signals([taken(grid(plan)[0], noisy(1), limited=0.01)], GATE, LIRA, plan)
+    assert (found.code, found.concerns) == ("force-limited", ("gate_margin", "catch_margin"))
 
 
 def test_readings_that_stand_out_of_normal_noise_are_told() -> None:
