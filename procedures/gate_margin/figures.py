@@ -71,12 +71,17 @@ def _histogram(x: Looked, found: Results, rig: RigFile) -> Figure:
                   tuple(series), notes=notes)  # fmt: skip
 
 
+def _short(x: Looked) -> str:
+    place = x.taken.place
+    return f"{place.place_m * 1e3:g}, {math.degrees(place.angle_rad):.0f}°"
+
+
 def _catch(found: Results) -> Figure:
     x = np.arange(float(len(found.looked)))
     series = [Series(c.plane.probe, x, (c.reach - c.excursion) * UM, "both") for c in found.caught]
     caption = ("What the bearings hold, from where the shaft rests and less how far it went from there: of each "
                "probe's plane and axis, by place. "
                "It is less where the magnets' middle is farther off.")  # fmt: skip
-    ticks = tuple((look.taken.place.name, float(k)) for k, look in enumerate(found.looked))
-    return Figure("catch", "What the catch has to spare", caption, "place", "catch margin / µm", tuple(series),
+    ticks = tuple((_short(look), float(k)) for k, look in enumerate(found.looked))
+    return Figure("catch", "What the catch has to spare", caption, "along / mm, around", "catch margin / µm", tuple(series),
                   lines=(("none", 0.0),), ticks=ticks)  # fmt: skip
