@@ -54,6 +54,7 @@ PROCEDURES = (
     _room("derivative", "Gain, error and band of an algebraic derivative, by injection"),
     _room("estimator-compare", "Velocity estimators in the loop: errors before, answers to a load"),
     _room("mission", "Lift, moves along and around at once, landing, on a linear-rotary machine"),
+    _room("gate-margin", "What a levitation gate and the bearings' catch have to spare, over places and angles"),
     _room("actuator-constant", "Force and torque constants of a mover's motors, by sines into its loops"),
     _room("current-step", "Step response of the current loops: rise, bands, what goes across"),
     _room("encoder-zero", "Electrical zero of each motor against its encoder, by steps of the current along the field"),

@@ -24,7 +24,7 @@ RIGS = {
     "amb5dof": ("bearing-model", "step", "tracking", "unbalance", "compensation", "balance", "run-up", "coast-down",
                 "sensitivity"),
     "amb1dof": ("derivative", "estimator-compare"),
-    "lira": ("mission", "actuator-constant"),
+    "lira": ("coil-map", "encoder-zero", "unstable-pole", "loop-response", "mission", "gate-margin", "actuator-constant"),
     "lira-200v": ("current-step",),
     "tsbs6": ("amb-calibration", "torque-constant", "spindown", "angle-step", "slew"),
 }  # fmt: skip

@@ -213,6 +213,22 @@ class LoopsAsked:
 
 
 @dataclass(frozen=True)
+class GateAsked:
+    """A levitated mover at rest, looked at for `windows` times the gate's time `gate_s` at each of the `places`, by name m and
+    rad; `settings` as those of steps, the parameters of the set points `place` and `angle`; the gate, m. `limits`: by probe
+    whose catch margin is asked for, the controller's greatest force, N."""
+
+    settings: Numbers
+    places: Mapping[str, tuple[float, float]]
+    place: str
+    angle: str
+    gate_m: float
+    gate_s: float
+    windows: int
+    limits: Numbers
+
+
+@dataclass(frozen=True)
 class Motions:
     """The truths of motion of one machine; None: it has none of that kind. Each takes the rig and what was drawn for it (a
     `Truth`) first.
@@ -234,6 +250,7 @@ class Motions:
         mission: largest readings, levels, errors at rest and times of a mission, by quantity and place.
         currents: what stepped currents do, by quantity and place.
         constants: of motors along and around, by quantity, where and place, of places by loop.
+        gates: what the gate and the catch have to spare, by quantity and where.
         speeds: at the torque limit, by sharing: `speed` rad/s, `bound` A of the torque current, `ripple` rad/s.
     """
 
@@ -251,6 +268,7 @@ class Motions:
     drag: Callable[[Any, DragAsked], Mapping[str, float]] | None = None
     band: Callable[[RigFile, Any, BandAsked], Mapping[tuple[str, float | None], float]] | None = None
     speeds: Callable[[RigFile, Any, SpeedsAsked], Mapping[str, Mapping[str, float]]] | None = None
+    gates: Callable[[RigFile, Any, GateAsked], Mapping[tuple[str, str], float]] | None = None
     mission: Callable[[RigFile, Any, MissionAsked], Mapping[tuple[str, str], float]] | None = None
     currents: Callable[[RigFile, Any, CurrentAsked], Mapping[tuple[str, str], float]] | None = None
     constants: (

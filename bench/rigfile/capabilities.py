@@ -209,6 +209,7 @@ def _tables(c: Capabilities) -> Iterator[tuple[str, str | Mapping[str, str]]]:
         yield from ((f"angle.{key}", value) for key, value in angle)
     if c.motion is not None:
         yield from ((f"motion.{key}", getattr(c.motion, key)) for key in MOVED)
+        yield "motion.radial", c.motion.radial
     if c.hold is not None:
         yield from ((f"hold.{key}", getattr(c.hold, key)) for key in HELD)
     yield from ((f"motor.{key}", value) for key, value in c.motor)

@@ -53,7 +53,8 @@ class LoopInjection(Part):
 class Motion(Part):
     """A mover that is sent along and around: parameters of its set points, `place` m and `angle` rad, and of what a move goes
     by, `*_rate` m/s, rad/s and `*_rise` m/s^2, rad/s^2; channels that show both, and `currents` of the bearings among those of
-    a capture. `gate` m and `gate_time` s: it counts as lifted when every radial probe has read less for so long."""
+    a capture. `gate` m and `gate_time` s: it counts as lifted when every radial probe has read less for so long. `radial`: by
+    probe the set point of what it reads, m, at once."""
 
     place: str
     place_rate: str = ""
@@ -65,18 +66,21 @@ class Motion(Part):
     angle_channel: str
     gate: str = ""
     gate_time: str = ""
+    radial: Mapping[Name, str] = {}
     currents: tuple[str, ...] = ()
 
 
 class HeldAxis(Part):
     """A direction in which a hold pushes: `value` of the parameter that chooses it; of the two planes, in their order, channels
     of captures that read their `positions` and the `currents` that push there, and places of the stated negative `stiffness`,
-    N/m."""
+    N/m. `carried`: the share of the weight of the mass that the controller knows which it adds in each plane beside its
+    limit."""
 
     value: float
     positions: tuple[str, str]
     currents: tuple[str, str]
     stiffness: tuple[str, str]
+    carried: float = Field(0.0, ge=0, le=1)
 
 
 class Hold(Part):

@@ -50,6 +50,7 @@ KINDS = {"set_points.axes": "m", "set_points.slew": "m/s", "set_points.slew_tilt
          "bias": "A", "angle.ref": "rad", "angle.slew": "rad/s", "angle.speed": "rad/s",
          "motion.place": "m", "motion.place_rate": "m/s", "motion.place_rise": "m/s^2", "motion.angle": "rad",
          "motion.angle_rate": "rad/s", "motion.angle_rise": "rad/s^2", "motion.gate": "m", "motion.gate_time": "s",
+         "motion.radial": "m",
          "hold.begin": "s", "hold.push": "A", "hold.bound": "m", "hold.limit": "N",
          "motor.phase_slew": "rad/s", "motor.phase_limit": "rad", "motor.circle": "m", "motor.circle_hz": "Hz",
          "current_limit": "A", "landing_speed": "rad/s", "lift_time": "s", "watchdog": "s"}  # fmt: skip
@@ -117,6 +118,9 @@ def _motion(rig: RigFile) -> Iterator[Line]:
             yield f"motion.{key}", repr(name), f"a channel of this file{near(name, rig.channels)}"
         elif units.UNITS.get(unit := rig.channels[name].unit, units.UNITS["1"]).si != si:
             yield f"motion.{key}", f"{name}, in {unit}", f"a channel in {si}"
+    for name in motion.radial:
+        if name not in rig.probes:
+            yield f"motion.radial.{name}", repr(name), f"a probe of this file{near(name, rig.probes)}"
     for name in motion.currents:
         if name not in captured:
             yield "motion.currents", repr(name), f"a channel of [capture.channels]{near(name, captured)}"

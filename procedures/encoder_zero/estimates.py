@@ -151,7 +151,9 @@ def _rounded_currents(motor: str, place: At, rig: RigFile) -> Influence:
     stepped = abs(float(found.pairs[:, found.group.stepped.index((motor, ALONG)), own].mean()))
     u = known[channel].scale / math.sqrt(12) * kept * math.sqrt(len(found.group.motors) / 2) / stepped
     name = f"rounding of the currents at place {found.place + 1}"
-    return Influence(f"rounded currents/{motor}/{found.place}", name, u, RAD, "B", "normal", source="counts of the currents")
+    return Influence(
+        f"rounded currents/{motor}/{found.place}", name, u, RAD, "B", "normal", source="counts of the currents"
+    )
 
 
 def _scatter(name: str, each: Array, unit: str) -> Influence:

@@ -168,6 +168,13 @@ ENCODER_ZERO = (
     "On a simulated machine with all of its electronics the zeros of two motors of one loop were off by up to 0.004° "
     "electrical where U was 0.001° to 0.003°. Why is not known, and it is in no interval.",
 )
+GATE_MARGIN = (
+    "The mover at rest: while it moves it reads more, which a mission tells, and the catch has less to spare by as much.",
+    "The force constant that the controller reckons with is the stated one: one that is 1 % greater makes the bearings' limit, "
+    "in amperes, and so every catch margin 1 % less.",
+    "Planes that are caught one by one, by forces that come at once. A loop that answers late needs some of it: of a nominal "
+    "machine whose force holds 69.9 µm, releases from rest are caught up to 64 to 66 µm.",
+)
 COIL_MAP = (
     "The readings of the angle and of z are right: a share is of what the winding's table gives at these. 1 degree electrical "
     "moves what a coil is asked for by at most 1.7 % of its system's current, and its share by less than 0.1 %.",

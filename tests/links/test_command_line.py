@@ -112,12 +112,14 @@ def listening(folder: Path, url: str) -> Callable[[], list[tuple[float, float]]]
      ("lira", "coil-map", ("repeats=2",)),
      ("lira", "encoder-zero", ("motors=['LA']", "repeats=3", "trial_rad=0")),
      ("lira", "unstable-pole", ("shots=8",)),
+     ("lira", "gate-margin", ("places_m=[0.008]", "angles_rad=[-1.5, 1.5]")),
      ("lira", "actuator-constant", ('loops="along"',))],
 )  # fmt: skip
 def test_procedures_over_the_command_line(tmp_path: Path, rig_name: str, procedure: str, plan: tuple[str, ...]) -> None:
     """Each against a served rig, as processes: what is measured holds what the machine was drawn with."""
     arguments = tuple(x for one in plan for x in ("--plan", one))
-    with processes.served(tmp_path, "--seed", "3", "--truth", "reduced=0", rig=rig_name, ports=PORTS) as rig:
+    reduced = int(procedure == "gate-margin")  # which minutes of captures and no current loop matter to
+    with processes.served(tmp_path, "--seed", "3", "--truth", f"reduced={reduced}", rig=rig_name, ports=PORTS) as rig:
         with processes.real_bench(
             tmp_path, "run", procedure, "--rig", rig_name, "--backend", "live", "--operator", "auto", "--no-report",
             *rig.links("cli:socket"), *arguments,

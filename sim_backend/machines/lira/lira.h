@@ -42,6 +42,7 @@ typedef struct {
     double model_l_rot, model_l_lin, model_l_f, model_c;
     double inject_axis, inject_place, inject_amplitude, inject_hz;
     double hold_bound_m, hold_most_s, hold_mean_s, hold_share, hold_planes; /* bits: planes that a hold pushes */
+    double gate_channels, gate_lag_s; /* bits: radial readings that the gate watches; low-pass before it, 0: none */
     double z_lift, v_lift, v_land, z_off, gate_m, gate_s, refuse_m, lost_m, lost_s, trip_A, supply_V, watchdog_s, rest_s; /* after the way down */
 } lira_control;
 
@@ -60,6 +61,7 @@ typedef struct {
     double star[5][216];                     /* exact step: columns of twelve for twelve states, three u_sw, three emfs */
     int32_t member[5][3];                    /* half-bridges of each star */
     int32_t currents_on, bearings_on, angle_on, axial_on, fresh, limited;
+    double gated[4]; /* radial readings as the gate has them */
     double mean[4], frozen[4]; /* slow means of the bearings' references B1 d, q, B2 d, q; what a hold keeps them at */
     int32_t held, hold_ended;  /* readings that a hold still has; why the last one ended: 0 its time, 1 a reading left the bound */
     double target[6], speed[6], rise[6]; /* where set points go, m or rad, and how fast at most */

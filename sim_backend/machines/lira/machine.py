@@ -19,6 +19,7 @@ from sim_backend.machines.lira.plant import DQ, TICKS_S, Plant
 from sim_backend.machines.lira.settings import BY_NAME, HELD, INJECTED, LONGEST_HOLD_S
 from sim_backend.machines.lira.truth_constants import constants
 from sim_backend.machines.lira.truth_current_step import currents
+from sim_backend.machines.lira.truth_gate import gates
 from sim_backend.machines.lira.truth_loops import loops
 from sim_backend.machines.lira.truth_mission import mission
 from sim_backend.motion import Motions
@@ -101,6 +102,7 @@ def params(v: Numbers, d: Numbers) -> Built:
     control = ControlParams(
         observer_pull=0.0 if d["no_pull"] else 1.0, one_zero=d["one_zero"],
         hold_planes=1.0 if d["hold_one_plane"] else 3.0, hold_most_s=0.0 if d["hold_deaf"] else LONGEST_HOLD_S,
+        gate_channels=d["gate_channels"], gate_lag_s=d["gate_lag_s"],
     )  # fmt: skip
     factors = {name: d[f"factor_{name}"] for name in FACTORS if d[f"factor_{name}"] != 1}
     return Built(plant, control, v["reduced"] != 0, v["rest_angle"], factors)
@@ -262,7 +264,7 @@ LIRA = Machine(
     controls=frozenset((*BY_NAME, *INJECTED, *HELD)) | SENT | {f"step_{name}" for name in DQ},
     tick_s=1 / TICKS_S,
     period_s=PERIOD_S,
-    motions=Motions(mission=mission, currents=currents, loops=loops, constants=constants),
+    motions=Motions(mission=mission, currents=currents, loops=loops, constants=constants, gates=gates),
     controller=SpokenController,
     served=LineController,
 )

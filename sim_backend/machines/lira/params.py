@@ -164,6 +164,8 @@ class ControlParams:
     hold_mean_s: float = 0.1  # stand-in: time constant of the mean that a hold keeps
     hold_share: float = 0.75  # stand-in: of the bearings' limit that a catch may take
     hold_planes: float = 3.0  # bits: 1 the first plane, 2 the second one
+    gate_channels: float = 15.0  # bits x1, x2, y1, y2: radial readings that the gate watches
+    gate_lag_s: float = 0.0  # of a low-pass before it; none
     z_lift: float = 8e-3  # stand-in: where it is lifted to, out of the rings
     v_lift: float = 0.02
     v_land: float = 0.01  # L VI-B, as the next four

@@ -46,6 +46,7 @@ static double farthest(const lira_state *st) {
 
 static void lift(const lira_control *c, lira_state *st) {
     st->bearings_on = 1;
+    memcpy(st->gated, st->read, sizeof st->gated);
     st->gate_clock = 0;
     st->mode = LIRA_LIFT;
     aim(st, Z, c->z_lift, c->v_lift, 1);
@@ -104,8 +105,19 @@ static void follow(lira_state *st, int j) {
     st->ref_rate[j] = arrives ? 0 : next;
 }
 
+/* the farthest of the radial readings that the gate watches: all four, as they are, but where it is planted otherwise */
+static double farthest_gated(const lira_control *c, lira_state *st) {
+    double share = c->gate_lag_s > STEP_S ? STEP_S / c->gate_lag_s : 1, out = 0;
+    for (int k = 0; k < 4; k++) {
+        st->gated[k] = share < 1 ? st->gated[k] + share * (st->read[k] - st->gated[k]) : st->read[k];
+        if ((int)c->gate_channels >> k & 1) out = most(out, fabs(st->gated[k]));
+    }
+    return out;
+}
+
 static void gate(const lira_control *c, lira_state *st) {
-    int inside = st->ref[Z] == st->target[Z] && farthest(st) <= c->gate_m;
+    double far = farthest_gated(c, st);
+    int inside = st->ref[Z] == st->target[Z] && far <= c->gate_m;
     st->gate_clock = inside ? st->gate_clock + 1 : 0;
     if (st->gate_clock * STEP_S >= c->gate_s) st->mode = LIRA_LEVITATED;
 }

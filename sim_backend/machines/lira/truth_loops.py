@@ -57,9 +57,12 @@ def noisy(p: PlantParams) -> PlantParams:
 class Flying:
     """The drawn machine, lifted, at its place, nothing injected; without noise, or with that of a seed."""
 
-    def __init__(self, drawn: Truth, settings: Mapping[str, float], noise: int | None = None) -> None:
+    def __init__(
+        self, drawn: Truth, settings: Mapping[str, float], noise: int | None = None, *, whole: bool = False
+    ) -> None:
+        """`whole`: with rounding, too."""
         built = drawn.plant
-        params = quiet(built.plant) if noise is None else noisy(built.plant)
+        params = built.plant if whole else quiet(built.plant) if noise is None else noisy(built.plant)
         self.plant = Plant(params, noise or 0, control=built.control, reduced=built.reduced)
         self.plant.put(angle=built.rest_angle)
         self.wait(BEAT_S)  # the firmware holds what it has read
