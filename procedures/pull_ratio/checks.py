@@ -81,8 +81,8 @@ def _linked(r: Result) -> Iterator[Finding]:
     """Bearing planes and probes' planes lie on the same side of the middle: r > 0, and other beside own is (1 - r)/(1 + r)."""
     for s in r.slopes:
         if abs(s.other) > OTHER * abs(s.own + s.other):
-            text = (f"the current goes by {s.other / (s.own + s.other):.0%} with the other plane's place: actuators or probes of "
-                    "both planes are exchanged.")  # fmt: skip
+            text = (f"the current goes by {s.other / (s.own + s.other):.0%} with the other plane's place: actuators or probes "
+                    "of both planes are exchanged.")  # fmt: skip
             yield Finding("planes-linked", text, s.loop, Effect.ERROR)
 
 
@@ -123,8 +123,8 @@ def _levers(r: Result, rig: RigFile) -> Iterator[Finding]:
         return
     found, (value, most) = r.estimates[LEVER, ""], stated
     if abs(found.value - value) > most + SURE * found.u:
-        text = (f"the actuators' planes are {found.value:.4f} times as far apart as the probes'; the rig file states {value:.4f}, "
-                f"off by {most:.4f} at most: does each probe read its own plane?")  # fmt: skip
+        text = (f"the actuators' planes are {found.value:.4f} times as far apart as the probes', {value:.4f} is stated, off by "
+                f"{most:.4f} at most: does each probe read its own plane?")  # fmt: skip
         yield Finding("levers-off", text, "", Effect.INDETERMINATE)
 
 

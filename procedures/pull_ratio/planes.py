@@ -127,6 +127,18 @@ def upwards(rig: RigFile, channel: str) -> float:
         return 0.0
 
 
+def needed_N(rig: RigFile, name: str, away_m: float) -> tuple[float, float]:
+    """What a loop has to give so far from its probe's zero, by the rig file's numbers, and the most that it gives, N: 0 and
+    infinity where these are not told."""
+    one, known = loop(rig, name), Places(rig).known
+    if one.limit not in rig.parameters or one.stiffness not in known or one.inertia not in known:
+        return 0.0, math.inf
+    sensor = rig.sensors.get(one.channel)
+    off = 0.0 if sensor is None else abs(sensor.offset.value) + math.sqrt(3) * sensor.offset.standard_uncertainty
+    weight = known[one.inertia].value * one.share * rig.site.gravity.value * abs(upwards(rig, one.channel))
+    return known[one.stiffness].value * (away_m + off) + weight, rig.parameters[one.limit].default
+
+
 @dataclass(frozen=True)
 class Level:
     """Where to go: `moved` is a loop, or both of an axis; `level_m` of these, all others at zero; `branch` +1 from below."""

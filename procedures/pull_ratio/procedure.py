@@ -34,6 +34,7 @@ from procedures.pull_ratio.planes import (
     axes,
     captured,
     currents,
+    needed_N,
     order,
     place,
     planes,
@@ -61,6 +62,7 @@ CENTRE = Quantity(estimates.CENTRE, "m", "reading in the middle of the magnets' 
 MEASURES = (PULL_RATIO, CURRENT_FREE, TURN, LEVER, CONSTANT, CENTRE)
 BY_POLE = (CONSTANT, CENTRE)
 MARGIN_S = 1e-3  # of a capture
+MARGIN = 0.8  # of a loop's limit: the magnets' centre is told by no rig file
 POLE = "unstable-pole"
 OBSERVER = "observer"
 
@@ -173,6 +175,11 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     if farthest > rig.envelope.max_levitated_position_m:
         limit = rig.envelope.max_levitated_position_m
         yield f"levels_m: found {farthest * 1e6:g} µm; the envelope allows {limit * 1e6:g} µm"
+    for name in (name for p in planes(rig) for name in p.loops):
+        force, most = needed_N(rig, name, farthest)
+        if force > MARGIN * most:
+            yield (f"levels_m: {name} would need {force:.3g} N at {farthest * 1e6:g} µm; expected at most {MARGIN:.0%} of its "
+                   f"loop's limit, {MARGIN * most:.3g} N")  # fmt: skip
     wanted = {motion.place: at} if motion is not None and at is not None else {}
     for level in (levels[0], levels[-1]):
         for axis in axes(rig):
