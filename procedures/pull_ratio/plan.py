@@ -25,5 +25,5 @@ class Plan(BenchPlan):
     max_ways_A: float = Field(
         10e-3, gt=0
     )  # between the mean currents of a level from below and from above, beside their noise
-    max_misfit_A: float = Field(20e-3, gt=0)  # of mean currents about the straight line, root mean square
+    max_misfit_A: float = Field(10e-3, gt=0)  # of mean currents about the straight line, root mean square
     max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
