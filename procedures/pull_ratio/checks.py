@@ -92,8 +92,9 @@ def _line(r: Result, taken: Sequence[Taken], plan: Plan) -> Iterator[Finding]:
     few = 1 / max(int((ways > 0).sum()), 1) + 1 / max(int((ways < 0).sum()), 1)
     for s in r.slopes:
         left = r.statics.left[:, 2 * s.plane : 2 * s.plane + 2] @ s.direction
-        noise = float(left.std(ddof=1))
-        apart = float(left[ways > 0].mean() - left[ways < 0].mean())
+        above, below = left[ways < 0], left[ways > 0]
+        apart = float(below.mean() - above.mean())
+        noise = math.sqrt((float(above.var(ddof=1)) + float(below.var(ddof=1))) / 2)
         if abs(apart) > plan.max_ways_A + SURE * noise * math.sqrt(few):
             text = (f"the current is {apart * 1e3:.3g} mA greater from below than from above, {plan.max_ways_A * 1e3:.3g} mA "
                     "allowed: friction, hysteresis, or levels that have not settled.")  # fmt: skip

@@ -17,8 +17,10 @@ class Plan(BenchPlan):
     observer: str = "position"  # of the rig's capabilities.settings.observer, where it has any
     place_m: float | None = None  # along the shaft; none: the middle that capabilities.hold states
     rest_s: float = Field(1.5, ge=0)  # at the place, before the first level
-    settle_s: float = Field(0.1, ge=0)  # after each step, at least
-    time_constants: float = Field(5.0, ge=2)  # of the loops' integrator, waited for after each step
+    step_m: float = Field(2.5e-6, gt=0)  # on the way from level to level
+    step_s: float = Field(0.02, ge=0)  # between two such steps
+    settle_s: float = Field(0.1, ge=0)  # at each level, at least
+    time_constants: float = Field(5.0, ge=2)  # of the loops' integrator, waited for at each level
     average_s: float = Field(0.05, ge=0.01)  # of each mean, captured
     rate_hz: float | None = Field(None, gt=0)  # of captures; none: the nearest to 35 kHz
     max_position_m: float = Field(2e-7, gt=0)  # settled: how far a mean reading may be off its set point

@@ -6,9 +6,9 @@ where no bearing has a current. `fit` says why no lever, mass or weight is in th
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import math
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from itertools import count
 
 from bench.calibration import Need
 from bench.errors import AnalysisError
@@ -83,37 +83,33 @@ def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
-    """Go to the place, then to each level; back to zero before other loops are moved."""
+    """Go to the place, then to each level; by way of zero before other loops are moved."""
     motion, at = rig.file.capabilities.motion, place(rig.file, plan)
     if motion is not None and at is not None:
         rig.levitation.write({motion.place: at})
     rig.clock.sleep(plan.rest_s)
-    before: Level | None = None
-    numbers = count()
-    for one in order(rig.file, plan):
-        if before is None or (before.axis, before.moved) != (one.axis, one.moved):
-            _approach(rig, plan, before, one)
-        _go(rig, plan, one)
-        _take(rig, plan, record, one, next(numbers))
-        before = one
-    if before is not None:
-        _approach(rig, plan, before, None)
+    points = {name: 0.0 for axis in axes(rig.file) for name in asked(rig.file, Level(axis, BOTH, 0.0, 1))}
+    zero, before = dict(points), ("", "")
+    for number, one in enumerate(order(rig.file, plan)):
+        if before != (one.axis, one.moved):
+            points = _go(rig, plan, points, zero)
+        points, before = _go(rig, plan, points, {**zero, **asked(rig.file, one)}), (one.axis, one.moved)
+        rig.clock.sleep(settle_s(rig.file, plan))
+        _take(rig, plan, record, one, number)
+    _go(rig, plan, points, zero)
 
 
-def _approach(rig: Rig, plan: Plan, before: Level | None, one: Level | None) -> None:
-    """By the levels between, none of them recorded: up to zero from where it is, and down again."""
-    down = sorted((x for x in plan.levels_m if x < 0), reverse=True)[:-1]
-    if before is not None:
-        for x in (*reversed(down), 0.0):
-            _go(rig, plan, Level(before.axis, before.moved, x, 1))
-    if one is not None:
-        for x in down:
-            _go(rig, plan, Level(one.axis, one.moved, x, -1))
-
-
-def _go(rig: Rig, plan: Plan, one: Level) -> None:
-    rig.levitation.write(asked(rig.file, one))
-    rig.clock.sleep(settle_s(rig.file, plan))
+def _go(rig: Rig, plan: Plan, points: Mapping[str, float], to: Mapping[str, float]) -> dict[str, float]:
+    """In small steps, all loops alike: a loop that holds against a pull answers a step by k_P/(k_P - K_pull) of it at first, some
+    twice as far, until its integrator has brought it back."""
+    moved = {name: (points[name], at) for name, at in to.items() if at != points[name]}
+    count = max((math.ceil(abs(at - start) / plan.step_m - 1e-9) for start, at in moved.values()), default=0)
+    for k in range(1, count + 1):
+        rig.levitation.write(
+            {name: at if k == count else start + (at - start) * k / count for name, (start, at) in moved.items()}
+        )
+        rig.clock.sleep(plan.step_s)
+    return dict(to)
 
 
 def _take(rig: Rig, plan: Plan, record: Recorder, one: Level, number: int) -> None:
