@@ -100,14 +100,13 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
 
 
 def _go(rig: Rig, plan: Plan, points: Mapping[str, float], to: Mapping[str, float]) -> dict[str, float]:
-    """In small steps, all loops alike: a loop that holds against a pull answers a step by k_P/(k_P - K_pull) of it at first, some
-    twice as far, until its integrator has brought it back."""
+    """In small steps, all loops alike: a loop that holds against a pull answers a step by k_P/(k_P - K_pull) of it at first,
+    some twice as far, until its integrator has brought it back."""
     moved = {name: (points[name], at) for name, at in to.items() if at != points[name]}
     count = max((math.ceil(abs(at - start) / plan.step_m - 1e-9) for start, at in moved.values()), default=0)
     for k in range(1, count + 1):
-        rig.levitation.write(
-            {name: at if k == count else start + (at - start) * k / count for name, (start, at) in moved.items()}
-        )
+        share = k / count
+        rig.levitation.write({name: start * (1 - share) + at * share for name, (start, at) in moved.items()})
         rig.clock.sleep(plan.step_s)
     return dict(to)
 
