@@ -181,7 +181,7 @@ PULL_RATIO = (
     "20 µm than at the middle changes it by about 0.3 %.",
     "Another angle or place along the shaft: what is uneven in the magnets and in the probes' target turns with the mover and "
     "moves the reading without current by its whole amount; the ratio it leaves alone.",
-    "A coil's current sensor whose offset is beyond its certificate: 0.2 A of one coil move the reading without current by up to "
-    "0.6 µm.",
+    "A coil's current sensor whose offset is beyond its certificate: 0.2 A of one coil move the reading without current by up "
+    "to 0.66 µm.",
     "Force constants of both planes apart: no set point tells them, only what they have together.",
 )
