@@ -51,6 +51,7 @@ PROCEDURES = (
     _room("sensitivity", "Sensitivity of the control loops by injection, with zones and margins"),
     _room("loop-response", "Bandwidth and sensitivity of position loops, by sines into reference and reading"),
     _room("unstable-pole", "Pole of a shaft that magnets pull away, by holding its currents for some ms"),
+    _room("pull-ratio", "Pull of magnets over the force constant, and where no current is needed, by set points"),
     _room("derivative", "Gain, error and band of an algebraic derivative, by injection"),
     _room("estimator-compare", "Velocity estimators in the loop: errors before, answers to a load"),
     _room("mission", "Lift, moves along and around at once, landing, on a linear-rotary machine"),

@@ -251,6 +251,7 @@ class Motions:
         currents: what stepped currents do, by quantity and place.
         constants: of motors along and around, by quantity, where and place, of places by loop.
         gates: what the gate and the catch have to spare, by quantity and where.
+        pulls: of where a channel along and one around read, what holds a shaft that magnets pull, by quantity and where.
         speeds: at the torque limit, by sharing: `speed` rad/s, `bound` A of the torque current, `ripple` rad/s.
     """
 
@@ -274,6 +275,7 @@ class Motions:
     constants: (
         Callable[[RigFile, Any, Mapping[str, Sequence[float]]], Mapping[tuple[str, str, float], float]] | None
     ) = None
+    pulls: Callable[[RigFile, Any, float, float], Mapping[tuple[str, str], float]] | None = None
 
 
 NONE = Motions()

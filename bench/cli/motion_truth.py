@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from bench.cli.truths import actuator, coils, gate, held, linear_rotary, motor, one_axis, rotor
+from bench.cli.truths import actuator, coils, gate, held, linear_rotary, motor, one_axis, pull, rotor
 from bench.cli.truths.settings import Found
 from bench.errors import BenchError
 from bench.procedure import Measured
@@ -51,6 +51,7 @@ TRUTHS: Mapping[str, Callable[[Any], Found]] = {
     "mission": linear_rotary.mission,
     "current-step": linear_rotary.currents,
     "unstable-pole": held.pole,
+    "pull-ratio": pull.pulls,
     "actuator-constant": actuator.constants,
     "coil-map": coils.shares,
     "gate-margin": gate.margins,

@@ -180,6 +180,7 @@ HELD = ("begin", "across", "push", "bound", "limit")
 """Those of a hold."""
 STEP_PARAMETERS = ("parameter", "gain", "current_limit")
 FORCE_PARAMETERS = ("added", "zero")
+LOOP_PARAMETERS = ("kp", "ki", "kd", "limit", "set_point")
 
 
 def parameters_named(c: Capabilities) -> Iterator[tuple[str, str]]:
@@ -230,7 +231,7 @@ def _tables(c: Capabilities) -> Iterator[tuple[str, str | Mapping[str, str]]]:
 def _of_loops(can: LoopInjection) -> Iterator[tuple[str, str | Mapping[str, str]]]:
     yield from ((f"loop_injection.{key}", getattr(can, key)) for key in ("axis", "place", "amplitude", "hz"))
     for name, one in can.loops.items():
-        yield from ((f"loop_injection.loops.{name}.{key}", getattr(one, key)) for key in ("kp", "ki", "kd", "limit"))
+        yield from ((f"loop_injection.loops.{name}.{key}", getattr(one, key)) for key in LOOP_PARAMETERS)
 
 
 def _of_coils(found: CoilMap) -> Iterator[tuple[str, str | Mapping[str, str]]]:

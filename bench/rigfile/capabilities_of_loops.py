@@ -20,7 +20,8 @@ class InjectedLoop(Part):
     """A position loop: `value` of the parameter that chooses it, the `channel` that shows what it holds (of telemetry and of
     captures alike), m or rad. What is told beside it: parameters of its PID `kp`, `ki`, `kd` and of the greatest force that it
     asks for, `limit`, N or N m; what it moves, `share` of the number `inertia`, and the negative `stiffness` that it holds
-    against, by their places in this file; the bit that says that it is `limited`."""
+    against, by their places in this file; the bit that says that it is `limited`; `set_point`, the parameter of where it holds,
+    m or rad."""
 
     value: float
     channel: str
@@ -32,6 +33,7 @@ class InjectedLoop(Part):
     share: float = Field(1.0, gt=0)
     stiffness: str = ""
     limited: Bit | None = None
+    set_point: str = ""
 
 
 class LoopInjection(Part):

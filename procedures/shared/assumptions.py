@@ -181,3 +181,14 @@ COIL_MAP = (
     "Two errors that cancel: a coil connected the other way round whose probe reads with the wrong sign pushes the right way.",
     "A coil of a linear winding that carries no q where the mover lies: which way round it is connected shows in no motion.",
 )
+PULL_RATIO = (
+    "Probes' axes that are rolled against the weight: 0.5° adds 0.15 µm to the magnetic centre across it, and as much of the "
+    "weight's current to a current across. The reading without current is what it is.",
+    "A pull that bends with the place: the ratio is that of a straight line over the levels. A pull that is 1 % stiffer at "
+    "20 µm than at the middle changes it by about 0.3 %.",
+    "Another angle or place along the shaft: what is uneven in the magnets and in the probes' target turns with the mover and "
+    "moves the reading without current by its whole amount; the ratio it leaves alone.",
+    "A coil's current sensor whose offset is beyond its certificate: 0.2 A of one coil move the reading without current by up "
+    "to 0.66 µm.",
+    "Force constants of both planes apart: no set point tells them, only what they have together.",
+)

@@ -113,6 +113,7 @@ def listening(folder: Path, url: str) -> Callable[[], list[tuple[float, float]]]
      ("lira", "encoder-zero", ("motors=['LA']", "repeats=3", "trial_rad=0")),
      ("lira", "unstable-pole", ("shots=8",)),
      ("lira", "gate-margin", ("places_m=[0.008]", "angles_rad=[-1.5, 1.5]")),
+     ("lira", "pull-ratio", ("levels_m=[-2e-5, 0.0, 2e-5]", "settle_s=1")),  # by the host's clock: the rig may be behind
      ("lira", "actuator-constant", ('loops="along"',))],
 )  # fmt: skip
 def test_procedures_over_the_command_line(tmp_path: Path, rig_name: str, procedure: str, plan: tuple[str, ...]) -> None:

@@ -11,7 +11,7 @@ DEFECTS: Final = {
     "cables_exchanged": 0.0, "actuator_reversed": 0.0, "coil_dead": 0.0, "weak_coil": 0.0, "weak_coil_gives": 1.0,
     "factor_kp_s": 1.0, "factor_kp_sl": 1.0, "factor_kp_v": 1.0, "factor_current_max": 1.0, "capacitance_factor": 1.0,
     "hold_one_plane": 0.0, "hold_deaf": 0.0, "gate_channels": 15.0, "gate_lag_s": 0.0,
-    "factor_ki_r": 1.0, "factor_ki_z": 1.0,
+    "factor_ki_b": 1.0, "factor_ki_r": 1.0, "factor_ki_z": 1.0,
 }  # fmt: skip
 """Planted defects and their harmless values. `coil_reversed`: number of the coil that is connected the other way round;
 `exchange_phases`: b and c of rotary actuator 1 or 2, or of both (3), exchanged at the terminals; `exchange_actuators`: 1, the
@@ -27,7 +27,7 @@ REVERSED: Final = (range(0), range(1, 7), range(7, 13), range(13, 16))
 """Coils of each actuator, by its number."""
 OPEN_OHM: Final = 5e3
 """Of a coil that is open: 40 mA at the whole supply."""
-FACTORS: Final = ("kp_s", "kp_sl", "kp_v", "current_max", "ki_r", "ki_z")
+FACTORS: Final = ("kp_s", "kp_sl", "kp_v", "current_max", "ki_b", "ki_r", "ki_z")
 ELECTRICAL: Final = (
     "coil_reversed",
     "exchange_phases",

@@ -22,6 +22,7 @@ from sim_backend.machines.lira.truth_current_step import currents
 from sim_backend.machines.lira.truth_gate import gates
 from sim_backend.machines.lira.truth_loops import loops
 from sim_backend.machines.lira.truth_mission import mission
+from sim_backend.machines.lira.truth_pull import pulls
 from sim_backend.motion import Motions
 
 HALVES: Final = range(1, COILS + 1)
@@ -264,7 +265,7 @@ LIRA = Machine(
     controls=frozenset((*BY_NAME, *INJECTED, *HELD)) | SENT | {f"step_{name}" for name in DQ},
     tick_s=1 / TICKS_S,
     period_s=PERIOD_S,
-    motions=Motions(mission=mission, currents=currents, loops=loops, constants=constants, gates=gates),
+    motions=Motions(mission=mission, currents=currents, loops=loops, constants=constants, gates=gates, pulls=pulls),
     controller=SpokenController,
     served=LineController,
 )
