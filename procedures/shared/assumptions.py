@@ -168,6 +168,14 @@ ENCODER_ZERO = (
     "On a simulated machine with all of its electronics the zeros of two motors of one loop were off by up to 0.004° "
     "electrical where U was 0.001° to 0.003°. Why is not known, and it is in no interval.",
 )
+EMF_CONSTANT = (
+    "Flux that grows with something else than the coordinate's phase: a field with a fifth harmonic of 1 % makes an emf that "
+    "turns faster, and its mean over a turn is none.",
+    "All voltages' sensors wrong alike by more than their certificates: flux and resistance by their share. A comparison with "
+    "force per ampere shows it.",
+    "Time is the controller's: a clock that is fast by 1e-4 makes the flux smaller by that share.",
+    "Iron that saturates or eddies: the flux is that of the currents of these moves.",
+)
 COIL_MAP = (
     "The readings of the angle and of z are right: a share is of what the winding's table gives at these. 1 degree electrical "
     "moves what a coil is asked for by at most 1.7 % of its system's current, and its share by less than 0.1 %.",
