@@ -134,10 +134,13 @@ def figures(results: Sequence[Result], recording: Recording[Plan]) -> Iterable[F
 
 def requires(rig: RigFile) -> Requires:
     """By the names that the rig has."""
-    wanted, of = ("force_currents", "coil_map", "current_steps", "motion"), windings(rig)
-    lacks = () if of else ("capabilities.current_steps: found voltages of no motor's coils",)
-    if rig.capabilities.motion is None or not of:
-        return Requires(capabilities=wanted, capture=(), lacks=lacks)
+    wanted, of, can = ("force_currents", "coil_map", "current_steps", "motion"), windings(rig), rig.capabilities
+    if can.motion is None or can.coil_map is None or not can.force_currents or not can.current_steps:
+        return Requires(capabilities=wanted, capture=())
+    if not of:
+        return Requires(
+            capabilities=wanted, capture=(), lacks=("capabilities.current_steps: found voltages of no motor's coils",)
+        )
     channels = tuple(n for w in of.values() for n in (w.channel, *w.coils, *w.voltages.values()))
     return Requires(
         channels=(STATE,),
