@@ -26,7 +26,7 @@ OF = {
                 "sensitivity"),
     "amb1dof": ("derivative", "estimator-compare"),
     "lira": ("loop-response", "unstable-pole", "mission", "actuator-constant", "current-step", "encoder-zero",
-             "emf-constant", "coil-map"),
+             "sensor-delay", "emf-constant", "coil-map"),
 }  # fmt: skip
 PAIRS = [(rig, name) for rig, names in OF.items() for name in names]
 TABLES = ("channels", "sensors", "parameters", "geometry", "machine")

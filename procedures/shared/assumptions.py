@@ -168,6 +168,13 @@ ENCODER_ZERO = (
     "On a simulated machine with all of its electronics the zeros of two motors of one loop were off by up to 0.004° "
     "electrical where U was 0.001° to 0.003°. Why is not known, and it is in no interval.",
 )
+SENSOR_DELAY = (
+    "A delay of the current's reading: what is told is that of the position less it.",
+    "Damping of the shaft, by eddy currents or air: it turns the phase by c ω/(m ω² + K), most at the unstable pole's "
+    "frequency, and a little of it reads as delay before it is a misfit.",
+    "A shaft or a sensor's holder that bends: at a sixth of the first bending mode the phase is still that of a rigid one.",
+    "Time is the controller's: a clock that is fast by 1e-4 makes delays smaller by that share.",
+)
 EMF_CONSTANT = (
     "Flux that grows with something else than the coordinate's phase: a field with a fifth harmonic of 1 % makes an emf that "
     "turns faster, and its mean over a turn is none.",
