@@ -19,6 +19,9 @@ from procedures.shared import signals
 
 HELD = "LEVITATED"
 APART = 4.5  # standard uncertainties that what should be alike may lie apart
+GAINS = (
+    3.0  # standard uncertainties of a voltage's gain: beyond what a certificate allows one coil against the mean of all
+)
 UNSEEN = 0.1  # standard uncertainty of a resistance, as a share, from which on it is said
 
 
@@ -79,7 +82,7 @@ def _coils(r: Result, rig: RigFile, plan: Plan) -> Iterator[Finding]:
     mean, count = r.estimates["flux"].value, len(r.by_coil)
     each, scatter = r.by_coil.mean(axis=0) / mean, r.by_coil.std(axis=0, ddof=1) / math.sqrt(count) / mean
     gains = [rig.sensors[v].gain.standard_uncertainty for v in r.winding.voltages.values()]
-    beyond = np.abs(each - 1) - plan.coil_share - APART * np.hypot(scatter, gains)
+    beyond = np.abs(each - 1) - plan.coil_share - np.hypot(APART * scatter, GAINS * np.array(gains))
     k = int(np.argmax(beyond))
     if beyond[k] > 0:
         text = (f"it links {each[k]:+.3f} of its motor's flux as its voltage is read: reversed or exchanged, without some of "

@@ -27,6 +27,6 @@ class Plan(BenchPlan):
     rate_hz: float | None = Field(None, gt=0)  # of captures; none: four times that of the loops
     window_s: float = Field(5e-3, gt=0)  # over which the voltages' equation is averaged
     nameplate_share: float = Field(0.03, gt=0)  # by which a flux may differ from what is printed of it
-    coil_share: float = Field(0.01, gt=0)  # by which a coil's flux may differ from its motor's
+    coil_share: float = Field(0.003, gt=0)  # by which a coil's flux may differ from its motor's
     max_u: float = Field(0.02, gt=0)  # standard uncertainty of a flux, as a share of it
     max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
