@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.rigfile import RigFile
+from bench.rigfile.places import Places
 from procedures.position_loops.injection import USUAL_HZ, Sine, ability, told, whole
 from procedures.sensor_delay.plan import Plan
 from procedures.shared.rates import rate_of
@@ -54,8 +55,6 @@ def sines(rig: RigFile, plan: Plan, loop: str) -> list[Sine]:
 
 def crossover_hz(rig: RigFile, loop: str) -> float | None:
     """Where the gain of a loop by its own numbers falls to 1: of (k_P + k_I/s + k_D s)/(M s^2 - K). None: they are not told."""
-    from bench.rigfile.places import Places
-
     one, known = ability(rig).loops[loop], Places(rig).known
     kp, ki, kd = (told(rig, {}, name) for name in (one.kp, one.ki, one.kd))
     if not kp or not kd or one.inertia not in known:
