@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from bench.cli.truths import actuator, coils, gate, held, linear_rotary, motor, one_axis, pull, rotor
+from bench.cli.truths import actuator, coils, delays, emf, gate, held, linear_rotary, motor, one_axis, pull, rotor
 from bench.cli.truths.settings import Found
 from bench.errors import BenchError
 from bench.procedure import Measured
@@ -53,6 +53,8 @@ TRUTHS: Mapping[str, Callable[[Any], Found]] = {
     "unstable-pole": held.pole,
     "pull-ratio": pull.pulls,
     "actuator-constant": actuator.constants,
+    "sensor-delay": delays.probes,
+    "emf-constant": emf.constants,
     "coil-map": coils.shares,
     "gate-margin": gate.margins,
 }

@@ -145,7 +145,8 @@ class ForceCurrent(Part):
     is added to its reference; `along`, the step of `current_steps` that goes along the field and gives none. `period` is the
     place in this file of a number that says how the current's phase goes with the loop's coordinate: a length has a turn of it,
     a count so many turns of it a turn. `zero`, the parameter that the controller takes for the encoder's zero against that
-    phase, rad electrical: the field's phase is the reading's less it. `stated`: what that zero is said to be."""
+    phase, rad electrical: the field's phase is the reading's less it. `stated`: what that zero is said to be. `flux`, the
+    parameter that has the flux of the nameplate, Wb, whatever it is meant to be of."""
 
     loop: str
     current: str
@@ -153,4 +154,5 @@ class ForceCurrent(Part):
     along: str = ""
     period: str
     zero: str = ""
+    flux: str = ""
     stated: Toleranced

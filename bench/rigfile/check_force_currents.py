@@ -10,7 +10,7 @@ from bench.rigfile.check_current_steps import Line, near
 from bench.rigfile.model import RigFile
 from bench.rigfile.places import Places
 
-PARAMETERS = {"added": "A", "zero": "rad"}
+PARAMETERS = {"added": "A", "zero": "rad", "flux": "Wb"}
 
 
 def problems_of(rig: RigFile) -> Iterator[Line]:

@@ -165,8 +165,6 @@ ENCODER_ZERO = (
     "A force along that comes with the current along the field, such as by saliency: it looks like a field that is laid wrong. "
     "Of an actuator of 83.5 N/A 0.1 N for each ampere is 0.07° electrical.",
     "A reference frame of the captured currents that is not the one in which the controller regulates them.",
-    "On a simulated machine with all of its electronics the zeros of two motors of one loop were off by up to 0.004° "
-    "electrical where U was 0.001° to 0.003°. Why is not known, and it is in no interval.",
 )
 GATE_MARGIN = (
     "The mover at rest: while it moves it reads more, which a mission tells, and the catch has less to spare by as much.",
@@ -174,6 +172,21 @@ GATE_MARGIN = (
     "in amperes, and so every catch margin 1 % less.",
     "Planes that are caught one by one, by forces that come at once. A loop that answers late needs some of it: of a nominal "
     "machine whose force holds 69.9 µm, releases from rest are caught up to 64 to 66 µm.",
+)
+SENSOR_DELAY = (
+    "A delay of the current's reading: what is told is that of the position less it.",
+    "Damping of the shaft, by eddy currents or air: it turns the phase by c ω/(m ω² + K), most at the unstable pole's "
+    "frequency, and a little of it reads as delay before it is a misfit.",
+    "A shaft or a sensor's holder that bends: at a sixth of the first bending mode the phase is still that of a rigid one.",
+    "Time is the controller's: a clock that is fast by 1e-4 makes delays smaller by that share.",
+)
+EMF_CONSTANT = (
+    "Flux that grows with something else than the coordinate's phase: a field with a fifth harmonic of 1 % makes an emf that "
+    "turns faster, and its mean over a turn is none.",
+    "All voltages' sensors wrong alike by more than their certificates: flux and resistance by their share. A comparison with "
+    "force per ampere shows it.",
+    "Time is the controller's: a clock that is fast by 1e-4 makes the flux smaller by that share.",
+    "Iron that saturates or eddies: the flux is that of the currents of these moves.",
 )
 COIL_MAP = (
     "The readings of the angle and of z are right: a share is of what the winding's table gives at these. 1 degree electrical "
