@@ -164,7 +164,7 @@ def test_a_capture_about_a_step(host: Host) -> None:
     rows = np.frombuffer(data, "<i2").reshape(-1, 2)
     assert np.mean(rows[:, 0]) * 0.122 == pytest.approx(400, abs=0.05)
     n = np.arange(4000)
-    left = rows[:, 1] * 1e-3 + 4 * law((n - stat["trigger"] + 1) / TICKS_S)
+    left = rows[:, 1] * 4e-4 + 4 * law((n - stat["trigger"] + 1) / TICKS_S)
     assert np.std(left) == pytest.approx(NOISE_A, rel=0.05)
 
 

@@ -90,6 +90,6 @@ def test_captures_are_the_firmwares_measurements() -> None:
     assert spec is not None
     told = [(n, c.index, c.type, c.scale, c.unit) for n, c in spec.channels.items()]
     assert told == [(m.name, k, "i16", m.lsb, m.unit) for k, m in enumerate(MEASUREMENTS)]
-    assert told[52:62] == [(f"i_{n}", 52 + k, "i16", 1e-3, "A") for k, n in enumerate(DQ)]
+    assert told[52:62] == [(f"i_{n}", 52 + k, "i16", 4e-4, "A") for k, n in enumerate(DQ)]
     assert told[62:] == [("wave", 62, "i16", 2**-15, "1"), ("held", 63, "i16", 1.0, "1")]
     assert spec.memory_bytes == 32 << 20

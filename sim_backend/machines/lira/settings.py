@@ -97,8 +97,8 @@ def _measurement(column: str) -> Measurement:
     return Measurement(name, column, "m", 1e-6 if column == "z" else 0.25e-6)
 
 
-INNER: Final = tuple(Measurement(f"i_{name}", f"i_{name}", "A", 1e-3) for name in DQ)
-"""The firmware's own dq currents."""
+INNER: Final = tuple(Measurement(f"i_{name}", f"i_{name}", "A", 4e-4) for name in DQ)
+"""The firmware's own dq currents, to 13 A: one of a coil is 7.3 mA, and what that makes of a dq current is rounded once more."""
 WAVE: Final = Measurement("wave", "wave", "1", 2**-15)
 """The sine that is injected, as a share of its amplitude."""
 HOLDS: Final = Measurement("held", "held", "1", 1.0)

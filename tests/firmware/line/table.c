@@ -76,7 +76,7 @@ void table_start(void)
     add(51, "gamma", "rad", 6.283185307179586 / 65536);
     for (int k = 0; k < CURRENTS; k++) {
         snprintf(name, sizeof name, "i_%s", dq[k]);
-        add(52 + k, name, "A", 1e-3);
+        add(52 + k, name, "A", 4e-4);
     }
     add(62, "wave", "1", 1.0 / 32768);
     add(63, "held", "1", 1);
