@@ -137,15 +137,17 @@ def _rounded_currents(motor: str, place: At, rig: RigFile) -> Influence:
     """What rounding the captured dq currents does to an angle. They are made of the counts Q of n coils at three angles, n/3 at
     each: of so few values that rounding them to q once more does not average out, alike each time. Of independent errors of
     rounding the mean keeps q/sqrt(12) times the root of the sum of squares of their shares: for normal counts of standard
-    deviation s at each angle that is (2 sqrt(pi) s)^(-3/2), s = n/sqrt(6) of the least of a dq current in Q. Each answer is half of
-    the difference of two means, and an angle the sum of one of each motor, over what is stepped."""
+    deviation s at each angle that is (2 sqrt(pi) s)^(-3/2), s = n/sqrt(6) of the least of a dq current in Q. Each answer is
+    half of the difference of two means, and an angle the sum of one of each motor, over what is stepped."""
     found, channel = place.answers, step_of(rig, motor).along
     coils = rig.motors[motor].currents
     assert rig.capture is not None
     known = rig.capture.channels
     count = max((known[c].scale for c in coils if c in known), default=0.0)
     own = column(found.group, motor, ALONG)
-    noise = float(min((s for s in found.noise[1:] if s > 0), default=0.0))  # of what flows there is more, and alike in all
+    noise = float(
+        min((s for s in found.noise[1:] if s > 0), default=0.0)
+    )  # of what flows there is more, and alike in all
     counts = len(coils) / math.sqrt(6) * noise / count if count else math.inf
     kept = min((2 * math.sqrt(math.pi) * counts) ** -1.5, 1.0) if counts > 0 else 1.0
     stepped = abs(float(found.pairs[:, found.group.stepped.index((motor, ALONG)), own].mean()))

@@ -61,7 +61,7 @@ static void telemetry(void)
     uint8_t data[44], *at = put(data, sequence++, 2);
     static const double scale[6] = {1e-8, 1e-8, 1e-8, 1e-8, 1e-6, 6.283185307179586 / 65536};
     for (int k = 0; k < 6; k++) at = put(at, counts(channel_value(46 + k), scale[k]), 2);
-    for (int k = 0; k < CURRENTS; k++) at = put(at, counts(channel_value(52 + k), 4e-4), 2);
+    for (int k = 0; k < CURRENTS; k++) at = put(at, counts(channel_value(52 + k), 1e-3), 2);
     at = put(at, (uint32_t)(channel_value(45) * 100 + 0.5), 2);
     at = put(put(put(at, state, 1), (uint32_t)fault, 1), 0, 2);
     at = put(at, counts(speed(), 0.005), 2);
