@@ -179,7 +179,7 @@ MOVED = ("place", "place_rate", "place_rise", "angle", "angle_rate", "angle_rise
 HELD = ("begin", "across", "push", "bound", "limit")
 """Those of a hold."""
 STEP_PARAMETERS = ("parameter", "gain", "current_limit")
-FORCE_PARAMETERS = ("added", "zero")
+FORCE_PARAMETERS = ("added", "zero", "feedforward")
 
 
 def parameters_named(c: Capabilities) -> Iterator[tuple[str, str]]:

@@ -139,7 +139,10 @@ class ForceCurrent(Part):
     is added to its reference; `along`, the step of `current_steps` that goes along the field and gives none. `period` is the
     place in this file of a number that says how the current's phase goes with the loop's coordinate: a length has a turn of it,
     a count so many turns of it a turn. `zero`, the parameter that the controller takes for the encoder's zero against that
-    phase, rad electrical: the field's phase is the reading's less it. `stated`: what that zero is said to be."""
+    phase, rad electrical: the field's phase is the reading's less it. `stated`: what that zero is said to be.
+
+    `constant`, N/A or N m/A: what its nameplate says. `cogging`: how many periods of it a turn of the current's phase has (0:
+    not told); `feedforward`, N or N m, the parameter by which the controller itself takes off the first harmonic of cogging."""
 
     loop: str
     current: str
@@ -148,3 +151,6 @@ class ForceCurrent(Part):
     period: str
     zero: str = ""
     stated: Toleranced
+    constant: Toleranced | None = None
+    cogging: int = Field(0, ge=0)
+    feedforward: str = ""
