@@ -234,6 +234,7 @@ class Motions:
         mission: largest readings, levels, errors at rest and times of a mission, by quantity and place.
         currents: what stepped currents do, by quantity and place.
         constants: of motors along and around, by quantity, where and place, of places by loop.
+        cogging: harmonics of it along and around, by quantity and where, of a shaft turned at rad/s at a place, m.
         speeds: at the torque limit, by sharing: `speed` rad/s, `bound` A of the torque current, `ripple` rad/s.
     """
 
@@ -256,6 +257,7 @@ class Motions:
     constants: (
         Callable[[RigFile, Any, Mapping[str, Sequence[float]]], Mapping[tuple[str, str, float], float]] | None
     ) = None
+    cogging: Callable[[RigFile, Any, float, float], Mapping[tuple[str, str], float]] | None = None
 
 
 NONE = Motions()
