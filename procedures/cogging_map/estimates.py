@@ -188,7 +188,7 @@ def _shape(m: _Made) -> tuple[Estimate, Estimate, Estimate, Estimate]:
     mass = _mass(m)
     first, second = _projected(m)
     rough = Influence(f"sweep/{loop}", "sweep: delay, period of the telemetry", s.amplitude
-                      * _rough(m), "A", "B", "rectangular", source="bound by speed and rate")  # fmt: skip
+                      * _rough(m) / math.sqrt(3), "A", "B", "rectangular", source="bound by speed and rate")  # fmt: skip
     size = Estimate.of(s.amplitude, m.scatter("first harmonic", m.u, "A")) + mass * first + Estimate.of(0.0, rough)
     turned = Estimate.of(0.0, m.scatter("phase", m.u / s.amplitude, "rad"))  # of cogging
     spread = _spread(m)
