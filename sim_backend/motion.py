@@ -235,6 +235,7 @@ class Motions:
         currents: what stepped currents do, by quantity and place.
         constants: of motors along and around, by quantity, where and place, of places by loop.
         cogging: harmonics of it along and around, by quantity and where, of a shaft turned at rad/s at a place, m.
+        runout: what turns with the shaft, vectors by quantity, plane and place along, m.
         speeds: at the torque limit, by sharing: `speed` rad/s, `bound` A of the torque current, `ripple` rad/s.
     """
 
@@ -258,6 +259,7 @@ class Motions:
         Callable[[RigFile, Any, Mapping[str, Sequence[float]]], Mapping[tuple[str, str, float], float]] | None
     ) = None
     cogging: Callable[[RigFile, Any, float, float], Mapping[tuple[str, str], float]] | None = None
+    runout: Callable[[RigFile, Any, Sequence[float]], Mapping[tuple[str, str, float], complex]] | None = None
 
 
 NONE = Motions()

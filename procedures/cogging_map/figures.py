@@ -27,7 +27,7 @@ def _figure(r: Result, turns: bool) -> Figure:
     shown = r.map.length * min(PERIODS, r.map.first) / r.map.first
     series = []
     for sign, name in ((1, "up"), (-1, "down")):
-        some = [p for p in r.passes if p.sign == sign]
+        some = [p for p in r.passes if p.sign == sign and p.fed]
         at = np.concatenate([np.mod(p.position - r.map.low, shown) for p in some])
         current = np.concatenate([np.mean(list(p.currents.values()), axis=0) for p in some])
         where = np.minimum((at / shown * BINS).astype(int), BINS - 1)
@@ -39,7 +39,7 @@ def _figure(r: Result, turns: bool) -> Figure:
     constant = np.mean([s.constant for s in r.swept])
     series.append(Series("first and second harmonic", scale * grid, gives * (constant + r.shape.at(phase))))
     what, per = ("torque", "N m") if turns else ("force", "N")
-    caption = (f"What takes cogging off, by the currents and the constants: means over places of all sweeps, the whole map "
-               f"laid on {shown * scale:.4g} {unit}. Up and down differ by friction alone.")  # fmt: skip
+    caption = (f"What takes cogging off, by the currents and the constants: means over places of sweeps with feedforward, "
+               f"the whole map laid on {shown * scale:.4g} {unit}. Up and down differ by friction alone.")  # fmt: skip
     return Figure(f"cogging-{r.map.loop}", f"Cogging: {r.map.loop}", caption, f"{r.map.loop} ({unit})", f"{what} ({per})",
                   tuple(series), lines=(("", 0.0),))  # fmt: skip

@@ -22,6 +22,7 @@ from sim_backend.machines.lira.truth_constants import constants
 from sim_backend.machines.lira.truth_current_step import currents
 from sim_backend.machines.lira.truth_loops import loops
 from sim_backend.machines.lira.truth_mission import mission
+from sim_backend.machines.lira.truth_runout import runout
 from sim_backend.motion import Motions
 
 HALVES: Final = range(1, COILS + 1)
@@ -265,7 +266,9 @@ LIRA = Machine(
     controls=frozenset((*BY_NAME, *INJECTED, *HELD)) | SENT | {f"step_{name}" for name in DQ},
     tick_s=1 / TICKS_S,
     period_s=PERIOD_S,
-    motions=Motions(mission=mission, currents=currents, loops=loops, constants=constants, cogging=cogging),
+    motions=Motions(
+        mission=mission, currents=currents, loops=loops, constants=constants, cogging=cogging, runout=runout
+    ),
     controller=SpokenController,
     served=LineController,
 )
