@@ -89,8 +89,8 @@ def _seen(rig: RigFile, plane: Plane, place: str, turned: Sequence[Turned]) -> S
     current, reading, whole, other = [], [], [], []
     for t in turned:
         (i, i_other), (e, e_other) = (
-            fit.vectors(t.angle, *(t.channels[c] for c in of), rig.shaft.sense, phase)
-            for of in (plane.currents, plane.positions)
+            fit.vectors(t.angle, t.channels[x], t.channels[y], rig.shaft.sense, phase)
+            for x, y in (plane.currents, plane.positions)
         )
         current.append(i)
         reading.append(e)
