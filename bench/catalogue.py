@@ -57,6 +57,8 @@ PROCEDURES = (
     _room("mission", "Lift, moves along and around at once, landing, on a linear-rotary machine"),
     _room("gate-margin", "What a levitation gate and the bearings' catch have to spare, over places and angles"),
     _room("actuator-constant", "Force and torque constants of a mover's motors, by sines into its loops"),
+    _room("cogging-map", "Cogging of a mover along and around, by slow sweeps both ways"),
+    _room("runout-map", "Runout of a levitated shaft's target and magnets, by slow turns"),
     _room("current-step", "Step response of the current loops: rise, bands, what goes across"),
     _room("encoder-zero", "Electrical zero of each motor against its encoder, by steps of the current along the field"),
     _room("sensor-delay", "How late positions are read, by their phase against the currents that push"),

@@ -252,6 +252,8 @@ class Motions:
         constants: of motors along and around, by quantity, where and place, of places by loop.
         gates: what the gate and the catch have to spare, by quantity and where.
         pulls: of where a channel along and one around read, what holds a shaft that magnets pull, by quantity and where.
+        cogging: harmonics of it along and around, by quantity and where, of a shaft turned at rad/s at a place, m.
+        runout: what turns with the shaft, vectors by quantity, plane and place along, m.
         speeds: at the torque limit, by sharing: `speed` rad/s, `bound` A of the torque current, `ripple` rad/s.
     """
 
@@ -276,6 +278,8 @@ class Motions:
         Callable[[RigFile, Any, Mapping[str, Sequence[float]]], Mapping[tuple[str, str, float], float]] | None
     ) = None
     pulls: Callable[[RigFile, Any, float, float], Mapping[tuple[str, str], float]] | None = None
+    cogging: Callable[[RigFile, Any, float, float], Mapping[tuple[str, str], float]] | None = None
+    runout: Callable[[RigFile, Any, Sequence[float]], Mapping[tuple[str, str, float], complex]] | None = None
 
 
 NONE = Motions()

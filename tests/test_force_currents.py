@@ -37,6 +37,7 @@ def test_the_rig_is_sound() -> None:
         ({"period": "machine/mass"}, "force_currents.LA.period", "a length"),
         ({"along": "L_x"}, "force_currents.LA.along", "current_steps"),
         ({"zero": "kp.z"}, "force_currents.LA.zero", "in rad"),
+        ({"feedforward": "ref_z"}, "force_currents.LA.feedforward", "in N or N m"),
     ],
 )
 def test_what_leads_nowhere(changes: dict[str, Any], key: str, expected: str) -> None:
@@ -49,6 +50,21 @@ def test_what_leads_nowhere(changes: dict[str, Any], key: str, expected: str) ->
 def test_a_zero_is_an_angle() -> None:
     stated = RIG.capabilities.force_currents["LA"].stated.model_copy(update={"unit": "m"})
     assert [k for k, _, _ in problems_of(bound(stated=stated))] == ["force_currents.LA.stated"]
+
+
+def test_a_constant_is_force_or_torque_per_ampere() -> None:
+    one = RIG.capabilities.force_currents["LA"]
+    assert one.constant is not None
+    constant = one.constant.model_copy(update={"unit": "N"})
+    assert [k for k, _, _ in problems_of(bound(constant=constant))] == ["force_currents.LA.constant"]
+
+
+def test_constants_are_what_the_simulation_draws() -> None:
+    drawn = {"LA": "force_constant", "RA1": "torque_constant_1", "RA2": "torque_constant_2"}
+    for motor, name in drawn.items():
+        stated, told = RIG.capabilities.force_currents[motor].constant, RIG.simulation[name]
+        assert stated is not None
+        assert (stated.value, stated.half_width, stated.unit) == (told.value, told.half_width, told.unit)
 
 
 def test_zeros_and_pitch_are_what_the_simulation_draws() -> None:

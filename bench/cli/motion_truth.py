@@ -9,7 +9,21 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from bench.cli.truths import actuator, coils, delays, emf, gate, held, linear_rotary, motor, one_axis, pull, rotor
+from bench.cli.truths import (
+    actuator,
+    cogging,
+    coils,
+    delays,
+    emf,
+    gate,
+    held,
+    linear_rotary,
+    motor,
+    one_axis,
+    pull,
+    rotor,
+    turning,
+)
 from bench.cli.truths.settings import Found
 from bench.errors import BenchError
 from bench.procedure import Measured
@@ -55,6 +69,8 @@ TRUTHS: Mapping[str, Callable[[Any], Found]] = {
     "actuator-constant": actuator.constants,
     "sensor-delay": delays.probes,
     "emf-constant": emf.constants,
+    "cogging-map": cogging.harmonics,
+    "runout-map": turning.runout,
     "coil-map": coils.shares,
     "gate-margin": gate.margins,
 }

@@ -179,7 +179,7 @@ MOVED = ("place", "place_rate", "place_rise", "angle", "angle_rate", "angle_rise
 HELD = ("begin", "across", "push", "bound", "limit")
 """Those of a hold."""
 STEP_PARAMETERS = ("parameter", "gain", "current_limit")
-FORCE_PARAMETERS = ("added", "zero", "flux")
+FORCE_PARAMETERS = ("added", "zero", "flux", "feedforward")
 LOOP_PARAMETERS = ("kp", "ki", "kd", "limit", "set_point")
 
 

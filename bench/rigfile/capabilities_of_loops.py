@@ -146,7 +146,10 @@ class ForceCurrent(Part):
     place in this file of a number that says how the current's phase goes with the loop's coordinate: a length has a turn of it,
     a count so many turns of it a turn. `zero`, the parameter that the controller takes for the encoder's zero against that
     phase, rad electrical: the field's phase is the reading's less it. `stated`: what that zero is said to be. `flux`, the
-    parameter that has the flux of the nameplate, Wb, whatever it is meant to be of."""
+    parameter that has the flux of the nameplate, Wb, whatever it is meant to be of.
+
+    `constant`, N/A or N m/A: what its nameplate says. `cogging`: how many periods of it a turn of the current's phase has (0:
+    not told); `feedforward`, N or N m, the parameter by which the controller itself takes off the first harmonic of cogging."""
 
     loop: str
     current: str
@@ -156,3 +159,6 @@ class ForceCurrent(Part):
     zero: str = ""
     flux: str = ""
     stated: Toleranced
+    constant: Toleranced | None = None
+    cogging: int = Field(0, ge=0)
+    feedforward: str = ""

@@ -10,7 +10,7 @@ from bench.rigfile.check_current_steps import Line, near
 from bench.rigfile.model import RigFile
 from bench.rigfile.places import Places
 
-PARAMETERS = {"added": "A", "zero": "rad", "flux": "Wb"}
+PARAMETERS = {"added": ("A",), "zero": ("rad",), "flux": ("Wb",), "feedforward": ("N", "N m")}
 
 
 def problems_of(rig: RigFile) -> Iterator[Line]:
@@ -52,10 +52,12 @@ def problems_of(rig: RigFile) -> Iterator[Line]:
             yield f"{key}.period", f"{one.period}, {known[one.period].value:g}", "more than 0"
         if one.stated.unit != "rad":
             yield f"{key}.stated", one.stated.unit, "an angle"
+        if one.constant is not None and one.constant.unit not in ("N/A", "N m/A"):
+            yield f"{key}.constant", one.constant.unit, "force or torque per ampere"
 
 
 def _parameters(rig: RigFile, key: str, one: ForceCurrent) -> Iterator[Line]:
     for name, si in PARAMETERS.items():
         parameter = rig.parameters.get(getattr(one, name))
-        if parameter is not None and parameter.unit in units.UNITS and units.UNITS[parameter.unit].si != si:
-            yield f"{key}.{name}", f"{getattr(one, name)}, in {parameter.unit}", f"a parameter in {si}"
+        if parameter is not None and parameter.unit in units.UNITS and units.UNITS[parameter.unit].si not in si:
+            yield f"{key}.{name}", f"{getattr(one, name)}, in {parameter.unit}", f"a parameter in {' or '.join(si)}"

@@ -11,8 +11,8 @@ from bench.findings import Effect, Finding
 from bench.rigfile import RigFile
 from procedures.actuator_constant.estimates import Looked, Result
 from procedures.actuator_constant.plan import Plan
-from procedures.actuator_constant.sines import around, motors
 from procedures.actuator_constant.steps import Added, Common, Taken
+from procedures.position_loops.motors import around, motors
 from procedures.shared import signals
 
 HELD = "LEVITATED"

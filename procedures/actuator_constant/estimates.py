@@ -10,17 +10,16 @@ import numpy as np
 
 from bench.errors import AnalysisError
 from bench.rigfile import RigFile
-from bench.rigfile.places import Places
 from bench.uncertainty import Estimate, Influence
 from procedures.actuator_constant import fit
 from procedures.actuator_constant.fit import Line, Response
 from procedures.actuator_constant.plan import Plan
-from procedures.actuator_constant.sines import Place, around, loops, motors, places
+from procedures.actuator_constant.sines import Place, loops, places
 from procedures.actuator_constant.steps import Added, Array, Taken
 from procedures.position_loops.injection import ability
 from procedures.position_loops.lines import counted
-from procedures.position_loops.motors import phase_rate
-from procedures.shared.certificates import certified, certified_gain
+from procedures.position_loops.motors import around, cosine, inertia, motors, off, phase_rate
+from procedures.shared.certificates import certified_gain
 
 Found = dict[tuple[str, str], Estimate]
 
@@ -60,7 +59,7 @@ def results(
     Raises:
         AnalysisError: lines that fit no mass.
     """
-    lost = {m: cosine(rig, m, _off(rig, plan, m, zeros)) for m in rig.capabilities.force_currents}
+    lost = {m: cosine(rig, m, off(rig, plan.parameters, m, zeros)) for m in rig.capabilities.force_currents}
     of = {loop: [a for a in added if a.common.loop == loop] for loop in loops(rig, plan)}
     return [_result(loop, taken, some, rig, plan, lost) for loop, some in of.items()]
 
@@ -157,34 +156,6 @@ def _gain(rig: RigFile, motor: str, weights: Array) -> Estimate:
     for coil, weight in zip(rig.motors[motor].currents, weights, strict=True):
         out = out + certified_gain(rig, coil) * float(weight)
     return out
-
-
-def _off(rig: RigFile, plan: Plan, motor: str, zeros: Mapping[str, Estimate] | None) -> Estimate | None:
-    """By how much the controller lays the currents of a motor wrong, rad, as it was measured; None where it was not."""
-    one, found = rig.capabilities.force_currents[motor], (zeros or {}).get(f"zero@{motor}")
-    if found is None or not one.zero:
-        return None
-    return found - plan.parameters.get(one.zero, rig.parameters[one.zero].default)
-
-
-def cosine(rig: RigFile, motor: str, off: Estimate | None = None) -> Estimate:
-    """1/cos of what the encoder's zero is `off`. Where that was not measured nothing here shows it: its mean and spread over
-    the tolerance, to the second order."""
-    if off is not None:
-        c, s = math.cos(off.value), math.sin(off.value)
-        return Estimate(1 / c, "1", (off * (s / c**2)).sensitivities)
-    zero = rig.capabilities.force_currents[motor].stated
-    v, u = zero.value, zero.standard_uncertainty
-    fourth = u**4 * (0.5 if zero.distribution == "normal" else 0.2)  # variance of the square's half
-    spread = Influence(f"capabilities/force_currents/{motor}/stated", f"zero of the encoder, {motor}: its cosine",
-                       math.sqrt((v * u) ** 2 + fourth), "1", "B", "normal", source=zero.source)  # fmt: skip
-    return Estimate.of(1 + (v * v + u * u) / 2, spread)
-
-
-def inertia(rig: RigFile, loop: str) -> Estimate:
-    """What the loop moves: of the rig file."""
-    one = ability(rig).loops[loop]
-    return certified(one.inertia, Places(rig).known[one.inertia]) * one.share
 
 
 def _estimates(

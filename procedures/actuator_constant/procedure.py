@@ -28,10 +28,8 @@ from procedures.actuator_constant.estimates import Result
 from procedures.actuator_constant.plan import Plan
 from procedures.actuator_constant.sines import (
     Place,
-    around,
     frequencies,
     loops,
-    motors,
     places,
     rate,
     sine,
@@ -40,7 +38,7 @@ from procedures.actuator_constant.sines import (
 )
 from procedures.actuator_constant.steps import ADDED, SINE, STATE, channels, read_added, read_taken
 from procedures.position_loops.injection import BELOW, REFERENCE, ability, injected, parameters_of
-from procedures.position_loops.motors import periods_of
+from procedures.position_loops.motors import around, motors, periods_of
 from procedures.shared import assumptions
 from procedures.shared.rates import of_rate
 

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.rigfile import RigFile
-from bench.rigfile.capabilities_of_loops import ForceCurrent, InjectedLoop
+from bench.rigfile.capabilities_of_loops import InjectedLoop
 from procedures.actuator_constant.plan import Plan
 from procedures.position_loops.injection import USUAL_HZ, Sine, ability, integrator_s, told, whole
+from procedures.position_loops.motors import around
 from procedures.shared.rates import rate_of
 
 
@@ -23,21 +24,10 @@ class Place:
     value: float
 
 
-def motors(rig: RigFile, loop: str) -> dict[str, ForceCurrent]:
-    """Those whose current gives force along a loop, by name."""
-    return {name: one for name, one in rig.capabilities.force_currents.items() if one.loop == loop}
-
-
 def loops(rig: RigFile, plan: Plan) -> tuple[str, ...]:
     """Those that the plan wants, of all that are known."""
     known = dict.fromkeys(one.loop for one in rig.capabilities.force_currents.values())
     return tuple(x for x in known if plan.loops == "all" or around(rig, x) == (plan.loops == "around"))
-
-
-def around(rig: RigFile, loop: str) -> bool:
-    """Whether it holds an angle."""
-    motion = rig.capabilities.motion
-    return motion is not None and ability(rig).loops[loop].channel == motion.angle_channel
 
 
 def places(rig: RigFile, plan: Plan, loop: str) -> tuple[Place, ...]:

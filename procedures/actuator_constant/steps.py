@@ -12,9 +12,9 @@ import numpy.typing as npt
 from bench.recording import Recording, Step
 from bench.rigfile import RigFile
 from procedures.actuator_constant.plan import Plan
-from procedures.actuator_constant.sines import motors
 from procedures.position_loops.injection import ability
 from procedures.position_loops.lines import without_trend
+from procedures.position_loops.motors import motors
 
 Array = npt.NDArray[np.float64]
 SINE, ADDED = "sine", "added"

@@ -32,3 +32,10 @@ def counted(scale: float, rms: float, swing: float) -> float:
     noise = max(rms**2 - scale * scale / 12, 0.0)  # without what rounding itself adds
     bessel = min(0.582, math.sqrt(scale / (math.pi**2 * max(swing, 1e-300))))
     return 2 * scale / math.pi * math.exp(-2 * noise * (math.pi / scale) ** 2) * bessel / math.sqrt(2)
+
+
+def unwound(angle: Array, middle: float) -> Array:
+    """An angle within half a turn as it went on, its middle next to `middle`, rad."""
+    x = np.unwrap(angle)
+    turn = 2 * math.pi
+    return np.asarray(x + turn * round((middle - (x.max() + x.min()) / 2) / turn))

@@ -161,6 +161,19 @@ ACTUATOR_CONSTANT = (
     "Time is the controller's: a clock that is fast by 1e-4 changes constants by 2e-4.",
     "A scale of the position beyond its certificate changes the constants along by its share.",
 )
+COGGING_MAP = (
+    "What the motors' constants are: a force is the current times a constant that is adopted or stated, and a constant that is "
+    "wrong changes it by its share. Currents and shares do not need it.",
+    "Third and higher harmonics: a third one is looked for, others are in no result.",
+    "Forces that go with the way as cogging does, such as by the shaft's weight where it does not lie level: they are in it.",
+    "Friction that is alike both ways is none: a constant force is in neither result.",
+)
+RUNOUT_MAP = (
+    "Which of both is out of round: a target and magnets that are uneven turn the same currents, and only their difference is "
+    "told. What moves along the shaft with the target alone may be seen in several places, where it is known to do so.",
+    "The ratio of force per ampere and negative stiffness beyond its tolerances: vectors change by its share, currents do not.",
+    "Probes and bearings whose axes are not those of the rig file: vectors turn with them.",
+)
 ENCODER_ZERO = (
     "A force along that comes with the current along the field, such as by saliency: it looks like a field that is laid wrong. "
     "Of an actuator of 83.5 N/A 0.1 N for each ampere is 0.07° electrical.",

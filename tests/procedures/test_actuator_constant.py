@@ -24,6 +24,7 @@ from procedures.actuator_constant.plan import Plan
 from procedures.actuator_constant.procedure import MEASURES, check, procedure, steps_on
 from procedures.actuator_constant.sines import Place, frequencies, sine
 from procedures.actuator_constant.steps import Added, Common, Taken
+from procedures.position_loops.motors import cosine, off
 from reports.figures import draw as draw_figure
 from sim_backend.machines.lira.params import PlantParams
 from sim_backend.machines.lira.truth_constants import along, around
@@ -111,7 +112,7 @@ def test_the_cosine_of_a_zero() -> None:
     zero = RIG.capabilities.force_currents["RA1"].stated
     assert zero.half_width is not None
     drawn = 1 / np.cos(np.linspace(-1, 1, 20001) * zero.half_width)
-    found = estimates.cosine(RIG, "RA1")
+    found = cosine(RIG, "RA1")
     assert found.value == pytest.approx(drawn.mean(), abs=1e-6)
     assert found.u == pytest.approx(drawn.std(), rel=2e-3)
 
@@ -119,10 +120,10 @@ def test_the_cosine_of_a_zero() -> None:
 def test_the_cosine_of_a_zero_that_was_measured() -> None:
     """10 degrees electrical off the controller's parameter, with u of 0.1 degrees: 1/cos, and its slope."""
     zero = Estimate.of(math.radians(10), Influence("zero", "zero", math.radians(0.1), "rad", "A", "normal"))
-    found = estimates.cosine(RIG, "LA", zero)
+    found = cosine(RIG, "LA", zero)
     assert found.value == pytest.approx(1.015427, abs=1e-6)
     assert found.u == pytest.approx(math.radians(0.1) * math.tan(math.radians(10)) * 1.015427, rel=1e-5)
-    shifted = estimates._off(RIG, Plan(parameters={"zero.la": math.radians(10)}), "LA", {"zero@LA": zero})
+    shifted = off(RIG, {"zero.la": math.radians(10)}, "LA", {"zero@LA": zero})
     assert shifted is not None
     assert shifted.value == pytest.approx(0.0, abs=1e-12)
 

@@ -11,6 +11,7 @@ DEFECTS: Final = {
     "cables_exchanged": 0.0, "actuator_reversed": 0.0, "coil_dead": 0.0, "weak_coil": 0.0, "weak_coil_gives": 1.0,
     "factor_kp_s": 1.0, "factor_kp_sl": 1.0, "factor_kp_v": 1.0, "factor_current_max": 1.0, "capacitance_factor": 1.0,
     "hold_one_plane": 0.0, "hold_deaf": 0.0, "gate_channels": 15.0, "gate_lag_s": 0.0,
+    "current_unfed": 0.0,
     "factor_ki_b": 1.0, "factor_ki_r": 1.0, "factor_ki_z": 1.0,
 }  # fmt: skip
 """Planted defects and their harmless values. `coil_reversed`: number of the coil that is connected the other way round;
@@ -22,7 +23,8 @@ after its zero was set; `one_zero`: 1, the firmware takes the zero of the first 
 half-bridges' readings; `no_pull`: 1, the observers do not know the negative stiffness; `position_sign_*`: of a probe;
 `factor_*`: what the firmware has of a gain or a limit that it was told; `capacitance_factor`: of every capacitor's own;
 `hold_one_plane`: 1, a hold pushes the first plane alone; `hold_deaf`: 1, a hold is answered and does not come; `gate_channels`:
-bits x1, x2, y1, y2 of the radial readings that the gate watches; `gate_lag_s`: of a low-pass before it."""
+bits x1, x2, y1, y2 of the radial readings that the gate watches; `gate_lag_s`: of a low-pass before it;
+`current_unfed`: 1, currents are told without what is fed forward against cogging."""
 REVERSED: Final = (range(0), range(1, 7), range(7, 13), range(13, 16))
 """Coils of each actuator, by its number."""
 OPEN_OHM: Final = 5e3

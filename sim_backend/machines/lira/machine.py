@@ -17,12 +17,14 @@ from sim_backend.machines.lira.operator import Attendant
 from sim_backend.machines.lira.params import COILS, ControlParams, Each, PlantParams
 from sim_backend.machines.lira.plant import DQ, TICKS_S, Plant
 from sim_backend.machines.lira.settings import BY_NAME, HELD, INJECTED, LONGEST_HOLD_S
+from sim_backend.machines.lira.truth_cogging import cogging
 from sim_backend.machines.lira.truth_constants import constants
 from sim_backend.machines.lira.truth_current_step import currents
 from sim_backend.machines.lira.truth_gate import gates
 from sim_backend.machines.lira.truth_loops import loops
 from sim_backend.machines.lira.truth_mission import mission
 from sim_backend.machines.lira.truth_pull import pulls
+from sim_backend.machines.lira.truth_runout import runout
 from sim_backend.motion import Motions
 
 HALVES: Final = range(1, COILS + 1)
@@ -54,13 +56,15 @@ TARGETS = {
 @dataclass(frozen=True)
 class Built:
     """A linear-rotary actuator: its plant, the firmware's parameters, whether it runs as the reduced model, the angle at
-    which it was left, rad, and what of its parameters the firmware works with, as `Plant` has them."""
+    which it was left, rad; what of its parameters the firmware works with, and whether it tells currents without what it feeds
+    forward, as `Plant` has them."""
 
     plant: PlantParams
     control: ControlParams
     reduced: bool = False
     rest_angle: float = 0.0
     factors: Mapping[str, float] = field(default_factory=dict)
+    unfed: bool = False
 
 
 def stated(rig: RigFile) -> dict[str, Toleranced]:
@@ -106,7 +110,7 @@ def params(v: Numbers, d: Numbers) -> Built:
         gate_channels=d["gate_channels"], gate_lag_s=d["gate_lag_s"],
     )  # fmt: skip
     factors = {name: d[f"factor_{name}"] for name in FACTORS if d[f"factor_{name}"] != 1}
-    return Built(plant, control, v["reduced"] != 0, v["rest_angle"], factors)
+    return Built(plant, control, v["reduced"] != 0, v["rest_angle"], factors, d["current_unfed"] != 0)
 
 
 def _moved(v: Numbers) -> dict[str, Any]:
@@ -218,7 +222,7 @@ def quantities(p: Built, _: Numbers) -> dict[str, float]:
 
 def make(p: Built, seed: int, _substeps: int) -> Any:
     """The plant itself, its mover as it was left: in the rings, at its angle."""
-    plant = Plant(p.plant, seed, control=p.control, reduced=p.reduced, factors=p.factors)
+    plant = Plant(p.plant, seed, control=p.control, reduced=p.reduced, factors=p.factors, unfed=p.unfed)
     plant.put(angle=p.rest_angle)
     return plant
 
@@ -265,7 +269,16 @@ LIRA = Machine(
     controls=frozenset((*BY_NAME, *INJECTED, *HELD)) | SENT | {f"step_{name}" for name in DQ},
     tick_s=1 / TICKS_S,
     period_s=PERIOD_S,
-    motions=Motions(mission=mission, currents=currents, loops=loops, constants=constants, gates=gates, pulls=pulls),
+    motions=Motions(
+        mission=mission,
+        currents=currents,
+        loops=loops,
+        constants=constants,
+        gates=gates,
+        pulls=pulls,
+        cogging=cogging,
+        runout=runout,
+    ),
     controller=SpokenController,
     served=LineController,
 )

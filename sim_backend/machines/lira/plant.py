@@ -50,10 +50,12 @@ class Plant:
         reduced: currents follow by a lag of second order and all goes at 35 kHz: for what current loops, wiring and electrical
             captures do not matter to.
         factors: planted: by parameter, what the firmware works with, of what it is told and tells.
+        unfed: planted: currents are told without what is fed forward against cogging.
     """
 
     def __init__(self, params: PlantParams | None = None, seed: int = 0, *, control: ControlParams | None = None,
-                 reduced: bool = False, factors: Mapping[str, float] | None = None) -> None:  # fmt: skip
+                 reduced: bool = False, factors: Mapping[str, float] | None = None,
+                 unfed: bool = False) -> None:  # fmt: skip
         self.params = params or PlantParams()
         self._p: Any = _ffi.new("lira_params *")
         self._c: Any = _ffi.new("lira_control *")
@@ -61,6 +63,7 @@ class Plant:
         fill(self._p, vars(self.params))
         fill(self._c, vars(control or ControlParams()))
         self._factors = dict(factors or {})
+        self._unfed = unfed
         for name, factor in self._factors.items():
             setattr(self._c, name, factor * getattr(self._c, name))
         _lib.lira_start(self._p, self._s, seed & (2**64 - 1))
@@ -190,7 +193,17 @@ class Plant:
         ticks = round(seconds * TICKS_S)
         rows = np.empty((ticks // every + 2 if every else 0, len(WHOLE if whole else TRACE)))
         count = self._advance(self._p, self._c, self._s, ticks, _ffi.cast("double *", rows.ctypes.data), every, whole)
+        if self._unfed:
+            self._leave_out(rows[:count])
         return rows[:count]
+
+    def _leave_out(self, rows: Array) -> None:
+        """Take what is fed forward against cogging off the currents that are told, as a reading of the loops' own would be."""
+        z, angle, along, *around = (TRACE.index(name) for name in ("z", "angle", "i_q_L", "i_q_R1", "i_q_R2"))
+        c = self._c
+        rows[:, along] -= c.model_cogging_force / c.model_force * np.sin(4 * np.pi / c.model_pitch * rows[:, z])
+        for k in around:
+            rows[:, k] -= c.model_cogging_torque / (2 * c.model_torque) * np.sin(48 * rows[:, angle])
 
 
 def ideal(params: PlantParams | None = None) -> PlantParams:

@@ -98,7 +98,7 @@ def _measurement(column: str) -> Measurement:
 
 
 INNER: Final = tuple(Measurement(f"i_{name}", f"i_{name}", "A", 4e-4) for name in DQ)
-"""The firmware's own dq currents, to 13 A: one of a coil is 7.3 mA, and what that makes of a dq current is rounded once more."""
+"""The firmware's own dq currents, to 13 A: of the 7.3 mA that a coil is read to little is left, and it is rounded once more."""
 WAVE: Final = Measurement("wave", "wave", "1", 2**-15)
 """The sine that is injected, as a share of its amplitude."""
 HOLDS: Final = Measurement("held", "held", "1", 1.0)
