@@ -55,6 +55,7 @@ PROCEDURES = (
     _room("estimator-compare", "Velocity estimators in the loop: errors before, answers to a load"),
     _room("mission", "Lift, moves along and around at once, landing, on a linear-rotary machine"),
     _room("actuator-constant", "Force and torque constants of a mover's motors, by sines into its loops"),
+    _room("bearing-constant", "Force constants of radial actuators, by weights hung on the mover at two places"),
     _room("current-step", "Step response of the current loops: rise, bands, what goes across"),
     _room("encoder-zero", "Electrical zero of each motor against its encoder, by steps of the current along the field"),
     _room("coil-map", "Coils, phases and actuators: is each where the controller takes it to be?"),

@@ -230,7 +230,9 @@ class ConsoleOperator:
     def _confirmed(self, what: str, when: str, asked: T, other: _Other[T]) -> T:
         """Make sure that the machine may be touched, and ask until it is done as asked, or the person says what was done
         instead."""
-        question = f"{_after(self.approach() or self.standing(), what)}\nPress Enter when {when}, or type stop to end the run{', ? for more' if other.more else ''}."
+        asks = _after(self.approach() or self.standing(), what)
+        more = ", ? for more" if other.more else ""
+        question = f"{asks}\nPress Enter when {when}, or type stop to end the run{more}."
         answer = self._answer(question)
         while answer not in DONE:
             try:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from bench.cli.truths import actuator, coils, held, linear_rotary, motor, one_axis, rotor
+from bench.cli.truths import actuator, coils, held, linear_rotary, motor, one_axis, rotor, weights
 from bench.cli.truths.settings import Found
 from bench.errors import BenchError
 from bench.procedure import Measured
@@ -53,4 +53,5 @@ TRUTHS: Mapping[str, Callable[[Any], Found]] = {
     "unstable-pole": held.pole,
     "actuator-constant": actuator.constants,
     "coil-map": coils.shares,
+    "bearing-constant": weights.constants,
 }

@@ -161,6 +161,11 @@ ACTUATOR_CONSTANT = (
     "Time is the controller's: a clock that is fast by 1e-4 changes constants by 2e-4.",
     "A scale of the position beyond its certificate changes the constants along by its share.",
 )
+BEARING_CONSTANT = (
+    "Both masses weigh as their certificates say: what both are off alike, such as by what hangs with them, changes the "
+    "constants by its share. One against the other is checked.",
+    "Nothing but the bearings carries the mover, such as a cable that pulls with the mass: 10 mN of 4 N are 0.25 %.",
+)
 ENCODER_ZERO = (
     "A force along that comes with the current along the field, such as by saliency: it looks like a field that is laid wrong. "
     "Of an actuator of 83.5 N/A 0.1 N for each ampere is 0.07° electrical.",
