@@ -25,7 +25,8 @@ OF = {
     "amb5dof": ("spindown", "step", "bearing-model", "tracking", "unbalance", "compensation", "balance", "run-up", "coast-down",
                 "sensitivity"),
     "amb1dof": ("derivative", "estimator-compare"),
-    "lira": ("loop-response", "unstable-pole", "mission", "actuator-constant", "bearing-constant", "current-step", "encoder-zero", "coil-map"),
+    "lira": ("loop-response", "unstable-pole", "mission", "actuator-constant", "bearing-constant", "current-step",
+             "encoder-zero", "coil-map"),
 }  # fmt: skip
 PAIRS = [(rig, name) for rig, names in OF.items() for name in names]
 TABLES = ("channels", "sensors", "parameters", "geometry", "machine")

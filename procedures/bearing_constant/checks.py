@@ -48,8 +48,8 @@ def of_signals(visits: Sequence[Visit], plan: Plan, rig: RigFile) -> Iterator[Fi
     far = max(visits, key=lambda v: float(np.abs(v.positions).max()))
     off = float(np.abs(far.positions).max())
     if off > plan.max_off_m:
-        text = (f"a radial reading was {off * 1e6:.2g} µm off its set point in the mean, {plan.max_off_m * 1e6:.2g} µm allowed: "
-                "the magnets pull with the rest. Settle longer.")  # fmt: skip
+        text = (f"a radial reading was {off * 1e6:.2g} µm off its set point in the mean, {plan.max_off_m * 1e6:.2g} µm "
+                "allowed: the magnets pull with the rest. Settle longer.")  # fmt: skip
         yield Finding("visit-unsettled", text, far.where, Effect.INDETERMINATE)
 
 
@@ -59,8 +59,8 @@ def of_result(r: Result, plan: Plan, rig: RigFile) -> Iterator[Finding]:
     if r.scatter > plan.max_scatter * most:
         left = np.abs(r.answers[0].left) + np.abs(r.answers[1].left)
         worst = r.visits[int(np.argmax(left))]
-        text = (f"forces of the visits scatter by {r.scatter * 1e3:.2g} mN, {plan.max_scatter * most * 1e3:.2g} mN allowed. The "
-                "one that is farthest off is named: did another mass hang, or at another place?")  # fmt: skip
+        text = (f"forces of the visits scatter by {r.scatter * 1e3:.2g} mN, {plan.max_scatter * most * 1e3:.2g} mN allowed. "
+                "The one that is farthest off is named: did another mass hang, or at another place?")  # fmt: skip
         yield Finding("visits-disagree", text, worst.where, Effect.INDETERMINATE)
     yield from _masses(r)
     yield from _places(r, rig)
@@ -69,8 +69,8 @@ def of_result(r: Result, plan: Plan, rig: RigFile) -> Iterator[Finding]:
         tolerated = AIMED + (_half(stated.stated) if stated is not None else math.radians(5.0))
         if abs(a.turned) > tolerated + SURE * a.u_turned:
             text = (f"the current of {plane.motor} that carries a weight is turned by {a.turned * DEG:.2g}° from up, "
-                    f"{tolerated * DEG:.2g}° tolerated: its encoder's zero is off, or its probes are turned. K_B has the length "
-                    "of the answer and does not change; what else the controller asks of it does.")  # fmt: skip
+                    f"{tolerated * DEG:.2g}° tolerated: its encoder's zero is off, or its probes are turned. K_B has the "
+                    "length of the answer and does not change; what else the controller asks of it does.")  # fmt: skip
             yield Finding("weight-turned", text, plane.motor)
 
 
@@ -80,7 +80,9 @@ def _half(t: Toleranced) -> float:
 
 def _masses(r: Result) -> Iterator[Finding]:
     """Whether both masses weigh as their certificates say, against each other."""
-    labels = sorted({v.load for v in r.visits if v.load}, key=lambda label: max(v.newtons for v in r.visits if v.load == label))
+    labels = sorted(
+        {v.load for v in r.visits if v.load}, key=lambda label: max(v.newtons for v in r.visits if v.load == label)
+    )
     if len(labels) != 2:
         return
     x = np.column_stack([*([v.newtons if v.load == label else 0.0 for v in r.visits] for label in labels),
@@ -93,8 +95,8 @@ def _masses(r: Result) -> Iterator[Finding]:
     apart = float(light - heavy)
     u = math.sqrt(found.covariance[0, 0] + found.covariance[1, 1] - 2 * found.covariance[0, 1])
     if abs(apart) > max(SURE * u, LEAST):
-        text = (f"by the currents {labels[0]} weighs {apart:+.2%} too much against {labels[1]}. Which masses hung? Look at their "
-                "certificates.")  # fmt: skip
+        text = (f"by the currents {labels[0]} weighs {apart:+.2%} too much against {labels[1]}. Which masses hung? Look at "
+                "their certificates.")  # fmt: skip
         yield Finding("masses-disagree", text, f"{labels[0]}, {labels[1]}", Effect.INDETERMINATE, _all(r))
 
 
@@ -108,7 +110,9 @@ def _places(r: Result, rig: RigFile) -> Iterator[Finding]:
     plane = max(_tolerance(rig, f"motors/{p.motor}") for p in r.planes)
     for hook, (at, u) in r.places.items():
         stated = Places(rig).place(f"hooks/{hook}").value - centre
-        room = _tolerance(rig, f"hooks/{hook}") + middle + (rig.hook_seat.half_width or 0.0) + abs(stated) / half * plane
+        room = (
+            _tolerance(rig, f"hooks/{hook}") + middle + (rig.hook_seat.half_width or 0.0) + abs(stated) / half * plane
+        )
         if abs(at - stated) > room + SURE * u:
             text = (f"by the currents the weight hung {at * 1e3:+.1f} mm from the middle between the planes; "
                     f"{stated * 1e3:+.1f} mm are stated, {room * 1e3:.1f} mm tolerated. Which hook was it? Do the currents of "

@@ -90,7 +90,9 @@ def _gain(rig: RigFile, plan: Plan, plane: Plane, a: Answer) -> Estimate:
 
 def _weights(visits: Sequence[Visit], rig: RigFile) -> Estimate:
     """What hung over what was taken for it: each mass by its part of the fit, and gravity."""
-    squares = {label: sum(v.newtons**2 for v in visits if v.load == label) for label in {v.load for v in visits if v.load}}
+    squares = {
+        label: sum(v.newtons**2 for v in visits if v.load == label) for label in {v.load for v in visits if v.load}
+    }
     out = Estimate.exact(0.0, "1")
     for label in sorted(squares):
         mass = rig.masses[label]
@@ -99,7 +101,9 @@ def _weights(visits: Sequence[Visit], rig: RigFile) -> Estimate:
     return out * certified("site/gravity", rig.site.gravity, "gravity") / rig.site.gravity.value
 
 
-def _places(answers: Sequence[Answer], two: Sequence[Plane], at: Sequence[str]) -> Iterator[tuple[str, tuple[float, float]]]:
+def _places(
+    answers: Sequence[Answer], two: Sequence[Plane], at: Sequence[str]
+) -> Iterator[tuple[str, tuple[float, float]]]:
     """By hook, m from the middle between the planes; its uncertainty by the scatter alone."""
     half = (two[0].at - two[1].at) / 2
     per = fit.forces(answers[0].rates, answers[1].rates)

@@ -26,7 +26,7 @@ APART = 0.2  # determinant over the product of its rows, at least: two places th
 @dataclass(frozen=True)
 class Answer:
     """Of a plane: `rates` (places,) A/N along the direction `turned`, rad from q towards d, in which its current answers; their
-    `covariance`; `dof`; `left` (n,) A of each visit along it; currents `q` (n,) along it less what is there without a load."""
+    `covariance`; `dof`; what is `left` (n,) A of each visit; currents (n,) `along` it, less what is there without a load."""
 
     rates: Array
     covariance: Array
@@ -52,10 +52,8 @@ def answer(design: Array, currents: Array) -> Answer:
     across = currents @ np.array([math.cos(turned), -math.sin(turned)])
     fit, other = linear(design, along), linear(design, across)
     u = math.sqrt(other.covariance[p, p]) / max(abs(fit.terms[p]), 1e-300)
-    free = design.copy()
-    free[:, :places] = 0
-    return Answer(fit.terms[:places], fit.covariance[:places, :places], turned, u, fit.dof, fit.residuals,
-                  along - free @ fit.terms)  # fmt: skip
+    less: Array = along - design[:, places:] @ fit.terms[places:]
+    return Answer(fit.terms[:places], fit.covariance[:places, :places], turned, u, fit.dof, fit.residuals, less)
 
 
 def forces(first: Array, other: Array) -> Array:
@@ -67,5 +65,4 @@ def forces(first: Array, other: Array) -> Array:
     rates = np.column_stack([first, other])
     if abs(np.linalg.det(rates)) < APART * float(np.prod(np.linalg.norm(rates, axis=1))):
         raise AnalysisError("weights at both places are answered alike: the currents tell one constant of both planes")
-    found: Array = np.linalg.solve(rates, np.ones(2))
-    return found
+    return np.asarray(np.linalg.solve(rates, np.ones(2)), np.float64)

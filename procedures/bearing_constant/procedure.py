@@ -122,7 +122,9 @@ def requires(rig: RigFile) -> Requires:
     if not rig.hooks:
         lacks.append("hooks: found none; expected where masses hang on the mover")
     if rig.capabilities.coil_map is None or rig.capabilities.motion is None or rig.capabilities.loop_injection is None:
-        return Requires(roles=("levitation", "operator"), capabilities=needed, masses=True, capture=(), lacks=tuple(lacks))
+        return Requires(
+            roles=("levitation", "operator"), capabilities=needed, masses=True, capture=(), lacks=tuple(lacks)
+        )
     try:
         two = planes(rig)
     except Lacking as error:

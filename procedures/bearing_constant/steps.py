@@ -21,7 +21,8 @@ VISIT, STATE = "visit", "state"
 @dataclass(frozen=True)
 class Visit:
     """One lift with what hung: `load` on `hook` ("": nothing), which weighs `newtons`; means of `currents` (planes, 2) A, d and
-    q, and of radial `positions` (n,) m; None where it was not captured. `limited`: share of samples with a loop at its limit."""
+    q, and of radial `positions` (n,) m; None where it was not captured. `limited`: share of samples in which a loop was
+    at its limit."""
 
     number: int
     hook: str

@@ -11,14 +11,14 @@ if TYPE_CHECKING:
 
 
 def constants(done: Simulated) -> Found:
-    """K_B of each plane is the machine's; of both together 1/(f_1/K_1 + f_2/K_2), each plane's share f of a weight by levers."""
+    """K_B of each plane is the machine's; of both together 1/(f_1/K_1 + f_2/K_2), shares f of a weight by levers."""
     from procedures.bearing_constant.stand import hooks, planes, set_points
 
     plan: Any = done.recording.plan
     rig, drawn = done.recording.rig, done.drawn.values
     two, motion = planes(rig), rig.capabilities.motion
-    k = [done.truth.get(f"K_B@{plane.motor}") for plane in two]
-    if motion is None or any(value is None for value in k):
+    k = [done.truth[name] for plane in two if (name := f"K_B@{plane.motor}") in done.truth]
+    if motion is None or len(k) < 2:
         return
     if len(hooks(rig, plan)) == 2:
         for plane, value in zip(two, k, strict=True):
