@@ -20,6 +20,7 @@ from procedures.shared.leastsquares import linear
 
 HELD = "LEVITATED"
 SURE = 4.5  # standard uncertainties that a sound rig does not reach
+TILTED = 0.02  # of the heaviest weight, that may scatter between the planes: a millimetre of where it hangs
 LEAST = 1e-3  # share by which weights may disagree whatever the scatter
 DEG = 180 / math.pi
 AIMED = math.radians(1.0)  # of the gravity against the probes' axes
@@ -56,6 +57,12 @@ def of_signals(visits: Sequence[Visit], plan: Plan, rig: RigFile) -> Iterator[Fi
 def of_result(r: Result, plan: Plan, rig: RigFile) -> Iterator[Finding]:
     """Visits that scatter, weights that disagree, that hung elsewhere, forces that are turned."""
     most = max(v.newtons for v in r.visits)
+    tilts = math.sqrt(float(r.tilting @ r.tilting) / r.answers[0].dof)
+    if tilts > TILTED * most:
+        worst = r.visits[int(np.argmax(np.abs(r.tilting)))]
+        text = (f"what one plane carries more than the other scatters by {tilts:.2g} N from visit to visit, "
+                f"{TILTED * most:.2g} N allowed; the one that is farthest off is named. Was it the right hook?")  # fmt: skip
+        yield Finding("visits-disagree", text, worst.where, Effect.INDETERMINATE, _all(r))
     if r.scatter > plan.max_scatter * most:
         left = np.abs(r.answers[0].left) + np.abs(r.answers[1].left)
         worst = r.visits[int(np.argmax(left))]

@@ -25,7 +25,8 @@ K_B, K_MEAN = "K_B", "K_mean"
 @dataclass(frozen=True)
 class Result:
     """`answers` of the planes; `places`, m from the middle between the planes, where each weight hung by the currents, and its
-    standard uncertainty; `forces` (n,) N of each visit; `scatter` N of a visit's force; the quantities by name and place."""
+    standard uncertainty; `forces` (n,) N of each visit; `scatter` N of a visit's force, and `tilting` N (n,) what the far plane
+    carries more than the other, off the fit; the quantities by name and place."""
 
     hooks: tuple[str, ...]
     planes: tuple[Plane, ...]
@@ -34,6 +35,7 @@ class Result:
     places: Mapping[str, tuple[float, float]]
     forces: Array
     scatter: float
+    tilting: Array
     estimates: Found
 
 
@@ -62,7 +64,8 @@ def result(visits: Sequence[Visit], rig: RigFile, plan: Plan) -> Result:
         found[K_B, two[k].motor] = _scattered(float(per[k]), row, scatter) * scale * gains[k]
     places = dict(_places(answers, two, at)) if told else {}
     rest = math.sqrt(float(together.residuals @ together.residuals) / together.dof)
-    return Result(at, two, answers, tuple(visits), places, forces, rest, found)
+    tilting = per[0] * answers[0].left - per[1] * answers[1].left
+    return Result(at, two, answers, tuple(visits), places, forces, rest, tilting, found)
 
 
 def _parts(covariance: Array, dof: int) -> list[tuple[Influence, Array]]:

@@ -144,6 +144,16 @@ def test_what_is_wrong_is_told(made: dict[str, Any], code: str) -> None:
     assert code in told(found(seen(**made)))
 
 
+def test_one_mass_on_the_other_hook() -> None:
+    """Both constants stay what they are; the visit is named."""
+    some, wrong = seen(noise=5e-4), seen(at={"near": 0.0605})
+    r = found([*some[:2], wrong[2], *some[3:]])
+    assert [(f.code, f.where) for f in checks.of_result(r, Plan(), rig())] == [
+        ("visits-disagree", "visit 3, M2 on near")
+    ]
+    assert r.estimates["K_B", "RA1"].value == pytest.approx(K[0], rel=2e-3)
+
+
 def test_signals_that_tell_nothing() -> None:
     some, plan = seen(), Plan()
 

@@ -218,3 +218,20 @@ def test_currents_carry_what_hangs_by_statics() -> None:
         means.append(rows[:, [TRACE.index("i_q_B1"), TRACE.index("i_q_B2")]].mean(axis=0))
     expected = 3.924 * np.array([0.5 + 60 / 90, 0.5 - 60 / 90]) / np.array([3.81, 3.59])
     assert means[1] - means[0] == pytest.approx(expected, rel=1e-3)
+
+
+def test_currents_come_on_again_without_a_kick() -> None:
+    """While PWM is off no integrator adds up what the current sensors are off: seconds of 20 mA would trip at 12 A."""
+    plant = Plant(replace(PlantParams(), coil_offset=(0.02, -0.02, 0.01) * 5), 1)
+    plant.command("idle")
+    plant.command("on")
+    plant.run(0.05)
+    plant.command("stop")
+    plant.run(2.0)
+    plant.command("on")
+    most = 0.0
+    for _ in range(40):
+        plant.run(0.25e-3)
+        most = max(most, float(np.abs(plant.electric[3]).max()))
+    assert plant.fault == "NONE"
+    assert most < 1.5

@@ -33,6 +33,8 @@ static void take_hold(lira_state *st) {
         st->ref_rate[j] = 0;
         aim(st, j, st->ref[j], j == Z ? 0.5 : 18, j == Z ? 40 : 300);
     }
+    memset(st->stator, 0, sizeof st->stator); /* which added up the sensors' offsets while nothing could answer */
+    memset(st->capacitor, 0, sizeof st->capacitor);
     st->currents_on = st->angle_on = st->axial_on = 1;
     st->heard = st->tick;
     st->mode = LIRA_CURRENT;
