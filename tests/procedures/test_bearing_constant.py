@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from bench.cli.motion_truth import truth_of_motion
-from bench.cli.virtual import Simulated, simulated_run
+from bench.cli.virtual import Simulated, flown, simulated_run
 from bench.errors import AnalysisError
 from bench.findings import Effect, Finding
 from bench.procedure import Measured
@@ -210,7 +210,7 @@ def test_the_truth_is_recovered(tmp_path: Path) -> None:
         assert abs(estimate.value - truth[name]) <= (span.high - span.low) / 2, name
         assert estimate.u < 2.5e-3 * estimate.value
     told = list(done.recording.events("approach"))
-    assert len(told) == 10  # of twelve visits two are as the one before
+    assert len(told) == 11  # one of twelve visits is as the one before
     figures = list(procedure.drawn(done.recording))
     assert [f.key for f in figures] == ["weights-RA1", "weights-RA2"]
     for figure in figures:
@@ -219,10 +219,16 @@ def test_the_truth_is_recovered(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("truth", "code"),
-    [({"misplaced": 3.0}, "visits-disagree"), ({"places_exchanged": 1.0}, "weight-misplaced"),
-     ({"mass_error_M1": 0.02}, "masses-disagree"), ({"discharge_factor": 1e6}, "not-discharged")],
+    [({"misplaced": 3.0}, "visits-disagree"),
+     pytest.param({"places_exchanged": 1.0}, "weight-misplaced", marks=pytest.mark.long),
+     pytest.param({"mass_error_M1": 0.02}, "masses-disagree", marks=pytest.mark.long)],
 )  # fmt: skip
 def test_what_is_planted_is_found(tmp_path: Path, truth: dict[str, float], code: str) -> None:
-    done = run(tmp_path, truth, average_s=0.2)
-    assert code in codes(done)
-    assert not any(isinstance(r, Measured) for r in done.results) or code != "not-discharged"
+    assert code in codes(run(tmp_path, truth, average_s=0.2))
+
+
+def test_an_open_bleeder_ends_it_before_anybody_is_asked(tmp_path: Path) -> None:
+    truth = {**REDUCED, "discharge_factor": 1e6}
+    done = flown("bearing-constant", "lira", 1, {}, tmp_path / "recording.mcap", truth)
+    assert [f.code for f in done.machine.ending.findings] == ["not-discharged"]
+    assert "Nobody was asked to touch it" in done.machine.ending.findings[0].text
