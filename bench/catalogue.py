@@ -59,6 +59,7 @@ PROCEDURES = (
     _room("actuator-constant", "Force and torque constants of a mover's motors, by sines into its loops"),
     _room("cogging-map", "Cogging of a mover along and around, by slow sweeps both ways"),
     _room("runout-map", "Runout of a levitated shaft's target and magnets, by slow turns"),
+    _room("bearing-constant", "Force constants of radial actuators, by weights hung on the mover at two places"),
     _room("current-step", "Step response of the current loops: rise, bands, what goes across"),
     _room("encoder-zero", "Electrical zero of each motor against its encoder, by steps of the current along the field"),
     _room("sensor-delay", "How late positions are read, by their phase against the currents that push"),

@@ -21,6 +21,7 @@ BenchError
   AnalysisError      the data do not allow the number                            exit 3
   Aborted            the run was stopped on purpose                              exit 4
     InterlockError   the envelope refused a command or tripped on telemetry
+      NotDischarged  a DC link was not seen below the voltage at which people may touch
     DeviceFault      the controller reported a fault
       DriveFault     the drive reported one
     AnotherHost      heartbeats of another host came in
@@ -148,6 +149,10 @@ class Aborted(BenchError):
 
 class InterlockError(Aborted):
     """The envelope refused a command (nothing was sent) or tripped on live telemetry."""
+
+
+class NotDischarged(InterlockError):
+    """A DC link was not seen below the voltage at which a person may touch the machine: nobody was asked to."""
 
 
 class DeviceFault(Aborted):

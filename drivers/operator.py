@@ -17,12 +17,15 @@ class LineOperator:
     """An operator that answers lines: `hang M2`, `hang -`, `hang HOOK M2`, `turn DEGREES`, `push DEGREES`,
     `push -`, `lever left M2`, `lever left -`, `mount ring`, `mount -`,
     `attach inboard KG RAD`, `detach inboard`, `ask TEXT` (see the simulated backend's operators). `may_touch` raises while
-    nobody may reach into the machine."""
+    nobody may reach into the machine; `approach` makes sure of what holds a voltage in it, before anything is asked for, and
+    tells by what."""
 
     def __init__(self, request: Callable[[str], str], clock: Clock, envelope: Envelope) -> None:
         self._request, self._clock, self._envelope = request, clock, envelope
         self.recorder: Recorder | None = None
         self.may_touch: Callable[[], None] = lambda: None
+        self.approach: Callable[[], str] = lambda: ""
+        self.standing: Callable[[], str] = lambda: ""
 
     def hang(self, load: Load) -> Load:
         """Have a mass hung in place of what hangs, and wait until it does.
@@ -108,6 +111,8 @@ class LineOperator:
         return True
 
     def _do(self, line: str, what: str) -> None:
+        if (seen := self.approach()) and self.recorder is not None:
+            self.recorder.event("approach", seen=seen)
         answer = self._request(line).split()
         if not answer or answer[0] != "ok":
             told = " ".join(answer) or "an empty line"

@@ -23,8 +23,9 @@ CLEAR = "take tools and hands away"
 
 class ConsoleOperator:
     """`prompt` shows a question and returns the line that is typed. What is confirmed is passed on to `then` (a simulated rig's
-    line), if there is one. `may_touch` raises while nobody may reach into the machine. `attended` is False where nobody is
-    there unless what has to be done asks for somebody."""
+    line), if there is one. `may_touch` raises while nobody may reach into the machine; `approach` makes sure of what holds a
+    voltage in it, before a person is asked to touch it, and tells by what; `standing` tells of a machine that is on.
+    `attended` is False where nobody is there unless what has to be done asks for somebody."""
 
     def __init__(
         self, prompt: Callable[[str], str], clock: Clock, envelope: Envelope, then: LineOperator | None
@@ -34,6 +35,8 @@ class ConsoleOperator:
         self.recorder: Recorder | None = None
         self.attended = True
         self.may_touch: Callable[[], None] = lambda: None
+        self.approach: Callable[[], str] = lambda: ""
+        self.standing: Callable[[], str] = lambda: ""
 
     def hang(self, load: Load) -> Load:
         """Ask for a mass to be hung, and return what hangs then; the hanger stays on. Nothing is asked where it hangs already.
@@ -161,7 +164,7 @@ class ConsoleOperator:
         Raises:
             OperatorAbort: the person answered stop.
         """
-        asked = f"{question}\nType yes or no, or stop to end the run."
+        asked = f"{_after(self.standing(), question)}\nType yes or no, or stop to end the run."
         answer = self._answer(asked)
         while answer not in (*YES, *NO):
             answer = self._answer(f"{_unknown(answer)}\n{asked}")
@@ -225,10 +228,11 @@ class ConsoleOperator:
         return grams * 1e-3, math.radians(degrees)
 
     def _confirmed(self, what: str, when: str, asked: T, other: _Other[T]) -> T:
-        """Ask until it is done as asked, or the person says what was done instead."""
-        question = (
-            f"{what}\nPress Enter when {when}, or type stop to end the run{', ? for more' if other.more else ''}."
-        )
+        """Make sure that the machine may be touched, and ask until it is done as asked, or the person says what was done
+        instead."""
+        asks = _after(self.approach() or self.standing(), what)
+        more = ", ? for more" if other.more else ""
+        question = f"{asks}\nPress Enter when {when}, or type stop to end the run{more}."
         answer = self._answer(question)
         while answer not in DONE:
             try:
@@ -261,6 +265,11 @@ class _Other(Generic[T]):
 
     more: str = ""
     read: Callable[[str], T | None] = lambda _: None
+
+
+def _after(said: str, what: str) -> str:
+    """What is asked, after what is told of the machine."""
+    return f"{said}\n{what}" if said else what
 
 
 def _degrees(answer: str) -> float | None:

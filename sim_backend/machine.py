@@ -173,7 +173,7 @@ class Truth:
             kg = self.values[f"masses.{label}"] * (1 + self.defects.get(f"mass_error_{label}", 0.0))
         if label or not self.defects["hanger_off_at_zero"]:
             kg += self.values["hanger"]
-        return kg, _weight(kg, self.values)
+        return kg, weight_in_air(kg, self.values)
 
     def on_lever(self, side: str, label: str) -> tuple[float, float, float]:
         """Mass in kg on the lever, its weight in air in N, and its arm in m, positive on the left.
@@ -185,10 +185,11 @@ class Truth:
         if not label:
             return 0.0, 0.0, arm
         kg = self.values[f"masses.{label}"] * (1 + self.defects.get(f"mass_error_{label}", 0.0))
-        return kg, _weight(kg, self.values), arm
+        return kg, weight_in_air(kg, self.values), arm
 
 
-def _weight(kg: float, v: Mapping[str, float]) -> float:
+def weight_in_air(kg: float, v: Mapping[str, float]) -> float:
+    """N of a conventional mass, with drawn values."""
     density = v["mass_density"]
     true = kg * (1 - 1.2 / 8000) / (1 - 1.2 / density)  # `kg` is a conventional mass, OIML D 28
     return true * v["site.gravity"] * (1 - v["site.air_density"] / density)

@@ -26,7 +26,7 @@ OF = {
                 "sensitivity"),
     "amb1dof": ("derivative", "estimator-compare"),
     "lira": ("loop-response", "unstable-pole", "pull-ratio", "mission", "gate-margin", "actuator-constant", "current-step",
-             "encoder-zero", "sensor-delay", "emf-constant", "cogging-map", "runout-map", "coil-map"),
+             "encoder-zero", "sensor-delay", "emf-constant", "cogging-map", "runout-map", "bearing-constant", "coil-map"),
 }  # fmt: skip
 PAIRS = [(rig, name) for rig, names in OF.items() for name in names]
 TABLES = ("channels", "sensors", "parameters", "geometry", "machine")

@@ -23,6 +23,7 @@ from bench.cli.truths import (
     pull,
     rotor,
     turning,
+    weights,
 )
 from bench.cli.truths.settings import Found
 from bench.errors import BenchError
@@ -73,4 +74,5 @@ TRUTHS: Mapping[str, Callable[[Any], Found]] = {
     "runout-map": turning.runout,
     "coil-map": coils.shares,
     "gate-margin": gate.margins,
+    "bearing-constant": weights.constants,
 }

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from bench.cli import console
 from bench.cli.safety import making_safe, may_touch
+from bench.cli.touching import approach, standing
 from bench.clock import Clock, WallClock
 from bench.errors import BenchError, ConfigError
 from bench.findings import SIMULATED_CONTROLLER, Finding
@@ -251,6 +252,7 @@ def _opened(
 
     for person in operators:
         person.may_touch = may_touch(controller, bus.drive)
+        person.approach, person.standing = approach(controller), standing(controller)
 
     def attach(recorder: Recorder | None) -> None:
         for part in recording:

@@ -5,6 +5,9 @@ OFF -> READY -> LEVITATED -> SPINNING and back. Levitation is not released while
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 
@@ -38,3 +41,14 @@ def _down(rig: Rig, here: RigState) -> None:
         rig.levitation.land()
     else:
         rig.levitation.disable()
+
+
+@contextmanager
+def within_reach(rig: Rig) -> Iterator[None]:
+    """Where an operator works on the machine: one with a DC link is landed and switched off before, since nobody is asked to
+    touch it else (`bench.cli.touching`), and is back in its state afterwards; any other stays as it is."""
+    before = rig.levitation.state
+    if rig.file.capabilities.dc_link is not None:
+        transition(rig, RigState.OFF)
+    yield
+    transition(rig, before)

@@ -14,6 +14,7 @@ from pydantic import Field, model_validator
 from bench.rigfile.bit import Bit
 from bench.rigfile.capabilities_of_coils import CoilMap
 from bench.rigfile.capabilities_of_loops import CurrentStep, ForceCurrent, Hold, LoopInjection, Motion
+from bench.rigfile.capabilities_of_power import DcLink
 from bench.rigfile.elements import Name
 from bench.rigfile.part import Part
 from bench.rigfile.toleranced import Toleranced
@@ -155,6 +156,7 @@ class Capabilities(Part):
     current_steps: Mapping[Name, CurrentStep] = {}
     force_currents: Mapping[Name, ForceCurrent] = {}
     coil_map: CoilMap | None = None
+    dc_link: DcLink | None = None
     model: Mapping[Name, str] = {}
     landing_speed: str = ""
     lift_time: str = ""

@@ -11,6 +11,7 @@ from bench.rigfile.capabilities import parameters_named
 from bench.rigfile.check_coil_map import problems_of as problems_of_coil_map
 from bench.rigfile.check_current_steps import near
 from bench.rigfile.check_current_steps import problems_of as problems_of_current_steps
+from bench.rigfile.check_dc_link import problems_of as problems_of_dc_link
 from bench.rigfile.check_force_currents import problems_of as problems_of_force_currents
 from bench.rigfile.check_hold import problems_of as problems_of_hold
 from bench.rigfile.model import RigFile
@@ -36,6 +37,7 @@ def problems_of(rig: RigFile) -> Iterator[Problem]:
         *problems_of_hold(rig),
         *problems_of_force_currents(rig),
         *problems_of_coil_map(rig),
+        *problems_of_dc_link(rig),
     ):
         yield Problem(rig.path, f"capabilities.{key}", found, expected)
 

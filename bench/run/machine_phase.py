@@ -24,6 +24,7 @@ from bench.errors import (
     InterlockError,
     LinkError,
     NoReply,
+    NotDischarged,
     OperatorAbort,
     OperatorRefused,
     OperatorSilent,
@@ -51,7 +52,8 @@ from bench.run.supervisor import SafeStep, Supervisor
 logger = logging.getLogger("bench.run.runner")
 CODES: tuple[tuple[type[BaseException], str], ...] = (
     (SignalAbort, "signal"), (OperatorAbort, "operator-stop"), (DriveFault, "drive-fault"),
-    (DeviceFault, "controller-fault"), (AnotherHost, "another-host"), (InterlockError, "interlock"),
+    (DeviceFault, "controller-fault"), (AnotherHost, "another-host"), (NotDischarged, "not-discharged"),
+    (InterlockError, "interlock"),
     (RegisterRefused, "device-refused"), (DeviceUnreadable, "device-unreadable"), (NoReply, "no-reply"),
     (BytesUnreadable, "bytes-unreadable"), (OperatorSilent, "operator-silent"), (FrozenError, "telemetry-frozen"),
     (ClockWrong, "clock-drift"),

@@ -174,6 +174,11 @@ RUNOUT_MAP = (
     "The ratio of force per ampere and negative stiffness beyond its tolerances: vectors change by its share, currents do not.",
     "Probes and bearings whose axes are not those of the rig file: vectors turn with them.",
 )
+BEARING_CONSTANT = (
+    "Both masses weigh as their certificates say: what both are off alike, such as by what hangs with them, changes the "
+    "constants by its share. One against the other is checked.",
+    "Nothing but the bearings carries the mover, such as a cable that pulls with the mass: 10 mN of 4 N are 0.25 %.",
+)
 ENCODER_ZERO = (
     "A force along that comes with the current along the field, such as by saliency: it looks like a field that is laid wrong. "
     "Of an actuator of 83.5 N/A 0.1 N for each ampere is 0.07° electrical.",

@@ -33,7 +33,7 @@ MOVES = {
     "pair_pitch": "pair_pitch", "cogging_force": "cogging_force", "cogging_force_2": "cogging_force_2",
     "cogging_torque": "cogging_torque", "coil_resistance_rot": "coil_r", "coil_resistance_lin": "coil_r",
     "machine.inductance_rot": "coil_l", "machine.inductance_lin": "coil_l", "filter_capacitance": "filter_c damper_c",
-    "supply": "supply", "zero_ra1": "zero_ra", "zero_ra2": "zero_ra", "zero_la": "zero_la",
+    "supply": "supply", "discharge": "discharge_s", "zero_ra1": "zero_ra", "zero_ra2": "zero_ra", "zero_la": "zero_la",
     "magnet_runout_1": "uneven", "magnet_runout_2": "uneven", "magnet_phase_1": "uneven_phase",
     "magnet_phase_2": "uneven_phase", "target_runout": "runout", "target_phase": "runout_phase", "eccentric_x": "eccentric",
     "eccentric_y": "eccentric", "filter_delay": "filter_lag", "adc_late": "late", "ring_friction": "ring_friction",
@@ -48,9 +48,11 @@ MOVES = {
         ("capacitor_derating_damper", "damper_c"))},
     "site.air_density": "", "machine.pole_pairs": "", "machine.pair_pitch": "", "rest_angle": "",
     **{f"u_s{k}.offset": "" for k in HALVES},
+    "geometry.hook_far": "", "geometry.hook_near": "", "masses.M1": "", "masses.M2": "", "mass_density": "",
 }  # fmt: skip
 """What moves which field of the plant: the air bears nothing, poles are counted, of the pitch it is the simulation's
-own number that counts, and voltages have no offset."""
+own number that counts, voltages have no offset, and masses and where they hang are
+what its operator goes by."""
 
 
 @cache

@@ -12,7 +12,8 @@ DEFECTS: Final = {
     "factor_kp_s": 1.0, "factor_kp_sl": 1.0, "factor_kp_v": 1.0, "factor_current_max": 1.0, "capacitance_factor": 1.0,
     "hold_one_plane": 0.0, "hold_deaf": 0.0, "gate_channels": 15.0, "gate_lag_s": 0.0,
     "current_unfed": 0.0,
-    "factor_ki_b": 1.0, "factor_ki_r": 1.0, "factor_ki_z": 1.0,
+    "factor_ki_b": 1.0, "factor_ki_r": 1.0, "factor_ki_z": 1.0, "discharge_factor": 1.0,
+    "mass_error_M1": 0.0, "mass_error_M2": 0.0, "places_exchanged": 0.0, "misplaced": 0.0,
 }  # fmt: skip
 """Planted defects and their harmless values. `coil_reversed`: number of the coil that is connected the other way round;
 `exchange_phases`: b and c of rotary actuator 1 or 2, or of both (3), exchanged at the terminals; `exchange_actuators`: 1, the
@@ -24,7 +25,10 @@ half-bridges' readings; `no_pull`: 1, the observers do not know the negative sti
 `factor_*`: what the firmware has of a gain or a limit that it was told; `capacitance_factor`: of every capacitor's own;
 `hold_one_plane`: 1, a hold pushes the first plane alone; `hold_deaf`: 1, a hold is answered and does not come; `gate_channels`:
 bits x1, x2, y1, y2 of the radial readings that the gate watches; `gate_lag_s`: of a low-pass before it;
-`current_unfed`: 1, currents are told without what is fed forward against cogging."""
+`current_unfed`: 1, currents are told without what is fed forward against cogging;
+`discharge_factor`: of the time that the DC link takes to discharge, 1e6 with an open bleeder;
+`mass_error_*`: share by which a mass is heavier than its certificate; `places_exchanged`: 1, whoever hangs masses takes one
+hook for the other; `misplaced`: number of the one hanging at which they do."""
 REVERSED: Final = (range(0), range(1, 7), range(7, 13), range(13, 16))
 """Coils of each actuator, by its number."""
 OPEN_OHM: Final = 5e3

@@ -14,6 +14,7 @@ typedef struct {
     double coil_r[15], coil_l[15];                                      /* of coils */
     double filter_l[15], filter_c[15], damper_c[15], damper_r[15], filter_r; /* of half-bridges */
     double supply, emf;                                                 /* V; share of the emf that there is */
+    double discharge_s; /* time constant of the DC link when nothing feeds it */
     double zero_ra[2], zero_la;                                         /* rad electrical: true phase is the encoder's less this */
     double centre[4], uneven[2], uneven_phase[2]; /* where the magnets pull from (x1, x2, y1, y2), and what turns with the mover */
     double runout, runout_phase, runout_per_m;    /* of the target */
@@ -21,6 +22,7 @@ typedef struct {
     double clearance, clearance_out, edge_in, edge_out, ring_stiffness, ring_damping, ring_friction, slip_speed, ring_radius;
     double stop_z, stop_stiffness, stop_damping;
     double push[6];               /* N at the planes (x1, x2, y1, y2), N along z, N m: planted or hung */
+    double hung, hung_at, hung_N; /* kg on the mover, m from its centre of mass towards plane 0, and what it weighs */
     double position_gain[6], position_offset[6], position_noise[6], position_lsb[6], filter_lag; /* x1 x2 y1 y2 z angle; s */
     double bridge_gain[15], bridge_offset[15], bridge_noise, bridge_lsb;   /* readings of i_f */
     double coil_gain[15], coil_offset[15], coil_noise, coil_lsb;           /* of i_s */
@@ -58,6 +60,7 @@ typedef struct {
     double cos_ra[2], sin_ra[2], cos_la, sin_la; /* firmware's phases at the last reading of the position */
     double lag[20], contact, phase, wave, injected;
     double zero_c[3], zero_s[3], uneven_c[2], uneven_s[2]; /* of the encoders' zeros (two rotary, linear) and of what is uneven */
+    double link;                             /* V of the DC link: fed while currents are on, else it discharges */
     double star[5][216];                     /* exact step: columns of twelve for twelve states, three u_sw, three emfs */
     int32_t member[5][3];                    /* half-bridges of each star */
     int32_t currents_on, bearings_on, angle_on, axial_on, fresh, limited;

@@ -21,6 +21,7 @@ void lira_start(const lira_params *p, lira_state *st, uint64_t seed) {
     st->fresh = 1;
     st->mode = LIRA_OFF;
     st->heard = -1;
+    st->link = p->supply;
     lira_stars(p, st);
 }
 
@@ -75,7 +76,7 @@ static INLINE int64_t tell_row(const lira_params *p, const lira_state *st, doubl
     memcpy(out + LIRA_TRACE, st->bridge_read, sizeof st->bridge_read);
     memcpy(out + LIRA_TRACE + BRIDGES, st->u_read, sizeof st->u_read);
     memcpy(out + LIRA_TRACE + 2 * BRIDGES, st->coil_read, sizeof st->coil_read);
-    out[LIRA_TRACE + 3 * BRIDGES] = p->supply;
+    out[LIRA_TRACE + 3 * BRIDGES] = st->link;
     out[LIRA_TRACE + 3 * BRIDGES + 1] = st->heard >= 0 ? (double)(st->tick - st->heard) * LIRA_TICK : -1;
     out[LIRA_TRACE + 3 * BRIDGES + 2] = st->held > 0;
     return LIRA_WHOLE;

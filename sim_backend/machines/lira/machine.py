@@ -72,7 +72,12 @@ def stated(rig: RigFile) -> dict[str, Toleranced]:
     out = {f"geometry.{k}": t for k, t in rig.geometry.items()} | {
         f"machine.{k}": t for k, t in rig.machine.items() if k not in EACH
     }
-    out |= {"site.gravity": rig.site.gravity, "site.air_density": rig.site.air_density}
+    out |= {
+        "site.gravity": rig.site.gravity,
+        "site.air_density": rig.site.air_density,
+        "mass_density": rig.mass_density,
+    }
+    out |= {f"masses.{k}": t for k, t in rig.masses.items()}
     for name, sensor in rig.sensors.items():
         out |= {f"{name}.gain": sensor.gain, f"{name}.offset": sensor.offset}
     for name, t in rig.simulation.items():
@@ -101,7 +106,8 @@ def params(v: Numbers, d: Numbers) -> Built:
                           "half-bridges")  # fmt: skip
     plant = PlantParams(
         **_moved(v), **_aligned(v, d), **_wound(v, d), **_sensed(v, d), **_wired(d),
-        filter_r=v["filter_resistance"], supply=v["supply"], clearance=v["geometry.clearance"],
+        filter_r=v["filter_resistance"], supply=v["supply"],
+        discharge_s=v["discharge"] * d["discharge_factor"], clearance=v["geometry.clearance"],
         ring_friction=v["ring_friction"],
     )  # fmt: skip
     control = ControlParams(
@@ -227,9 +233,9 @@ def make(p: Built, seed: int, _substeps: int) -> Any:
     return plant
 
 
-def operator(_rig: RigFile, _plant: Any, _truth: Truth) -> Attendant:
+def operator(rig: RigFile, plant: Any, truth: Truth) -> Attendant:
     """Who works on it."""
-    return Attendant()
+    return Attendant(rig, plant, truth)
 
 
 def places(_: Numbers, at: Mapping[str, int]) -> tuple[list[int], list[int]]:

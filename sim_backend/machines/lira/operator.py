@@ -1,11 +1,62 @@
-"""Who works on the linear-rotary actuator: answers questions, and has nothing to hang on it."""
+"""Who works on the linear-rotary actuator: hangs weights on the ends of its mover, once nothing in it is live."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Final
+
+from bench.rigfile import RigFile
+from sim_backend.draws import uniform
+from sim_backend.machine import Truth, weight_in_air
+from sim_backend.machines.lira.plant import Plant
+
+HAND_OVER_S: Final = 5.0
+TOUCHED: Final = ("OFF", "IDLE", "FAULT")
+HARMLESS_V: Final = 60.0
+
 
 class Attendant:
-    """Says yes."""
+    """Says yes, and hangs masses on hooks of a mover that lies. `hung` counts the hangings.
+
+    Args:
+        rig: its hooks count from the mover's centre of mass, each by one number of `[geometry]`.
+    """
+
+    def __init__(self, rig: RigFile, plant: Plant, truth: Truth) -> None:
+        self._plant, self._truth = plant, truth
+        self._at = {name: _drawn(str(hook.at), truth.values) for name, hook in rig.hooks.items()}
+        self._seat_m = rig.hook_seat.half_width or 0.0
+        self.hung = 0
 
     def request(self, line: str) -> str:
-        """One line: `ask TEXT`. Answers `yes` or `error TEXT`."""
-        return "yes" if line.split()[:1] == ["ask"] else f"error cannot {line.strip()!r}"
+        """One line: `hang HOOK M1`, `hang HOOK -`, `ask TEXT`. Answers `ok SECONDS`, `yes` or `error TEXT`."""
+        match line.split():
+            case ["ask", *_]:
+                return "yes"
+            case ["hang", hook, label] if hook in self._at and (
+                label == "-" or f"masses.{label}" in self._truth.values
+            ):
+                if self._plant.state not in TOUCHED or self._plant.link_V >= HARMLESS_V:
+                    return f"error the machine is live: {self._plant.state}, {self._plant.link_V:.0f} V"
+                self._hang(hook, "" if label == "-" else label)
+                return f"ok {HAND_OVER_S}"
+        return f"error cannot {line.strip()!r}"
+
+    def _hang(self, hook: str, label: str) -> None:
+        self.hung += 1
+        defects, values = self._truth.defects, self._truth.values
+        if not label:
+            self._plant.hang(0.0, 0.0, 0.0)
+            return
+        others = [at for name, at in self._at.items() if name != hook]
+        elsewhere = defects["places_exchanged"] or defects["misplaced"] == self.hung
+        at = others[0] if elsewhere and others else self._at[hook]
+        kg = values[f"masses.{label}"] * (1 + defects.get(f"mass_error_{label}", 0.0))
+        seat = self._seat_m * (2 * uniform(self._truth.seed, f"seat:{self.hung}", self._truth.visit) - 1)
+        self._plant.hang(kg, weight_in_air(kg, values), at + seat)
+
+
+def _drawn(at: str, values: Mapping[str, float]) -> float:
+    """A place as the rig file says it: the identity of a number, with its sign."""
+    name = at.removeprefix("-").strip().replace("/", ".")
+    return -values[name] if at.startswith("-") else values[name]

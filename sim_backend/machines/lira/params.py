@@ -42,6 +42,7 @@ class PlantParams:
     damper_r: Each = (6.8,) * COILS
     filter_r: float = 0.02  # stand-in
     supply: float = 400.0
+    discharge_s: float = 2.0  # stand-in: bleeder; to 60 V in 3.8 s, IEC 60204-1 asks for 5 s
     emf: float = 1.0
     zero_ra: Pair = (0.0, 0.0)
     zero_la: float = 0.0
@@ -65,6 +66,9 @@ class PlantParams:
     stop_stiffness: float = 1e6
     stop_damping: float = 800.0
     push: Each = (0.0,) * 6
+    hung: float = 0.0  # kg
+    hung_at: float = 0.0
+    hung_N: float = 0.0
     position_gain: Each = (1.0,) * 6
     position_offset: Each = (0.0,) * 6
     position_noise: Each = (0.3e-6,) * 4 + (1e-6, 30e-6)

@@ -168,6 +168,16 @@ class Plant:
         """Outer forces from now on: N at the planes (x1, x2, y1, y2), N along z, N m."""
         self._p.push[0:6] = [float(x) for x in newtons]
 
+    def hang(self, kg: float, newtons: float, at: float) -> None:
+        """A mass on the mover in place of what is on it: where, m from its centre of mass towards the first plane, and what it
+        weighs there."""
+        self._p.hung, self._p.hung_N, self._p.hung_at = kg, newtons, at
+
+    @property
+    def link_V(self) -> float:
+        """Of the DC link."""
+        return float(self._s.link)
+
     @property
     def place(self) -> Array:
         """True x, y, alpha, beta, z, angle and their rates, (12,)."""

@@ -33,6 +33,8 @@ static void take_hold(lira_state *st) {
         st->ref_rate[j] = 0;
         aim(st, j, st->ref[j], j == Z ? 0.5 : 18, j == Z ? 40 : 300);
     }
+    memset(st->stator, 0, sizeof st->stator); /* which added up the sensors' offsets while nothing could answer */
+    memset(st->capacitor, 0, sizeof st->capacitor);
     st->currents_on = st->angle_on = st->axial_on = 1;
     st->heard = st->tick;
     st->mode = LIRA_CURRENT;
@@ -150,7 +152,13 @@ static void watch(const lira_params *p, const lira_control *c, lira_state *st) {
     if (silent) host_lost(c, st);
 }
 
+/* U = U_0 exp(-t/T) through the bleeder once nothing feeds the DC link; how fast it is charged again is not modelled */
+static void feed(const lira_params *p, lira_state *st) {
+    st->link = st->currents_on ? p->supply : st->link * exp(-STEP_S / p->discharge_s);
+}
+
 void lira_supervise(const lira_params *p, const lira_control *c, lira_state *st) {
+    feed(p, st);
     if (st->mode < LIRA_CURRENT || st->mode == LIRA_FAULT) return;
     for (int j = 0; j < 6; j++) follow(st, j);
     if (st->mode == LIRA_LIFT) gate(c, st);
