@@ -21,7 +21,7 @@ from procedures.shared.certificates import certified, certified_gain
 Array = npt.NDArray[np.float64]
 Found = dict[tuple[str, str], Estimate]
 RATIO, FREE, TURN, LEVER = "pull_ratio", "current_free", "frame_turn", "lever_ratio"
-CONSTANT, CENTRE = "bearing_constant", "magnet_centre"
+CONSTANT, CENTRE, PULL = "bearing_constant", "magnet_centre", "K_pull"
 ALONG_WEIGHT = 0.5  # cosine from which on an axis carries the weight
 
 
@@ -67,8 +67,10 @@ class Coil:
     share: float
 
 
-def result(taken: Sequence[Taken], rig: RigFile, poles: Mapping[str, Estimate] | None) -> Result:
-    """All of it; `poles`, 1/s, as they were measured, by `pole@` and the axis.
+def result(
+    taken: Sequence[Taken], rig: RigFile, poles: Mapping[str, Estimate] | None, constants: Mapping[str, Estimate] | None = None
+) -> Result:
+    """All of it; as they were measured `poles`, 1/s, by `pole@` and the axis, and `constants`, N/A, by `K_B@` and the plane.
 
     Raises:
         AnalysisError: levels that do not tell it.
@@ -83,6 +85,8 @@ def result(taken: Sequence[Taken], rig: RigFile, poles: Mapping[str, Estimate] |
     out[LEVER, ""] = _lever(slopes, rig, found.dof)
     if poles is not None:
         out |= _by_pole(out, rig, poles)
+    if constants is not None:
+        out |= _by_constants(out, rig, constants)
     return Result(found, slopes, out)
 
 
@@ -209,4 +213,14 @@ def _by_pole(found: Found, rig: RigFile, poles: Mapping[str, Estimate]) -> Found
             sag = certified("site/gravity", rig.site.gravity, "gravity") * up / pole**2
             read = sag * (gain(rig, channels[0]) + gain(rig, channels[1])) * 0.5
             out[CENTRE, axis] = (free[0] + free[1]) * 0.5 - _in("m", read)
+    return out
+
+
+def _by_constants(found: Found, rig: RigFile, constants: Mapping[str, Estimate]) -> Found:
+    """K_pull of each plane, the mean of both its axes, where its K_B was measured."""
+    out: Found = {}
+    for plane in planes(rig):
+        if (known := constants.get(f"K_B@{plane.name}")) is not None:
+            ratio = (found[RATIO, plane.loops[0]] + found[RATIO, plane.loops[1]]) * 0.5
+            out[PULL, plane.name] = _in("N/m", known * ratio)
     return out

@@ -14,6 +14,9 @@ class Plan(BenchPlan):
 
     levels_m: tuple[float, ...] = Field(tuple(round(x * 1e-5, 9) for x in range(-2, 3)), min_length=3)
     pole: Literal["none", "calibration"] = "none"  # calibration: that of unstable-pole gives the force constant, too
+    constants: Literal["none", "calibration"] = (
+        "none"  # calibration: those of bearing-constant give the pull of each plane
+    )
     observer: str = "position"  # of the rig's capabilities.settings.observer, where it has any
     place_m: float | None = None  # along the shaft; none: the middle that capabilities.hold states
     rest_s: float = Field(1.5, ge=0)  # at the place, before the first level

@@ -59,11 +59,13 @@ CONSTANT = Quantity(estimates.CONSTANT, "N/A", "(K_pull,1 + K_pull,2)/(K_pull,1/
                     "both planes together", title="force constant, both planes")  # fmt: skip
 CENTRE = Quantity(estimates.CENTRE, "m", "reading in the middle of the magnets' pull along the weight, mean of both planes",
                   title="magnetic centre along the weight")  # fmt: skip
-MEASURES = (PULL_RATIO, CURRENT_FREE, TURN, LEVER, CONSTANT, CENTRE)
+PULL = Quantity(estimates.PULL, "N/m", "negative stiffness of a plane, mean of both axes: its K_pull/K_B times its K_B",
+                title="pull of a plane")  # fmt: skip
+MEASURES = (PULL_RATIO, CURRENT_FREE, TURN, LEVER, CONSTANT, CENTRE, PULL)
 BY_POLE = (CONSTANT, CENTRE)
 MARGIN_S = 1e-3  # of a capture
 MARGIN = 0.8  # of a loop's limit: the magnets' centre is told by no rig file
-POLE = "unstable-pole"
+POLE, CONSTANTS = "unstable-pole", "bearing-constant"
 OBSERVER = "observer"
 
 
@@ -73,8 +75,9 @@ def step_count(plan: Plan) -> int:
 
 
 def needs(plan: Plan) -> tuple[Need, ...]:
-    """The pole, where the plan wants what follows from it."""
-    return (Need(POLE),) if plan.pole == "calibration" else ()
+    """The pole and the force constants, where the plan wants what follows from them."""
+    wanted = ((POLE, plan.pole), (CONSTANTS, plan.constants))
+    return tuple(Need(name) for name, how in wanted if how == "calibration")
 
 
 def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
@@ -135,8 +138,8 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Evaluated:
     taken = read_taken(recording)
     findings.gate(checks.of_signals(taken, rig, plan))
     try:
-        poles = recording.calibration(POLE).values if needs(plan) else None
-        result = estimates.result(taken, rig, poles)
+        known = {need.procedure: recording.calibration(need.procedure).values for need in needs(plan)}
+        result = estimates.result(taken, rig, known.get(POLE), known.get(CONSTANTS))
     except AnalysisError as error:
         findings.end(Finding("no-pull", f"{error}.", "", Effect.ERROR))
     findings.gate(checks.of_result(result, taken, rig, plan))
@@ -210,8 +213,8 @@ def requires(rig: RigFile) -> Requires:
 
 
 def left_out(plan: Plan) -> tuple[Quantity, ...]:
-    """Without a pole neither what follows from it."""
-    return BY_POLE if plan.pole == "none" else ()
+    """What follows from what the plan does not take."""
+    return (*(BY_POLE if plan.pole == "none" else ()), *((PULL,) if plan.constants == "none" else ()))
 
 
 procedure = Procedure(
@@ -229,7 +232,7 @@ procedure = Procedure(
     settings=settings,
     needs=needs,
     step_count=step_count,
-    optional=BY_POLE,  # without a pole; and where no axis carries the weight
+    optional=(*BY_POLE, PULL),  # without a pole or constants; and where no axis carries the weight
     left_out=left_out,
     assumes=assumptions.PULL_RATIO,
     method=read_method(__file__),

@@ -108,6 +108,18 @@ def test_without_current_along_the_weight_it_is_centre_and_sag_together() -> Non
         assert r.estimates["current_free", f"y{k + 1}"].value == pytest.approx(expected, abs=1e-12)
 
 
+def test_with_force_constants_the_pull_of_each_plane() -> None:
+    from bench.uncertainty import Estimate
+
+    known = {f"K_B@RA{k + 1}": Estimate.exact(force, "N/A") for k, force in enumerate(FORCE)}
+    r = estimates.result(levels(0.05), load_rig("lira"), None, known)
+    for k, pull in enumerate(PULL):
+        assert r.estimates["K_pull", f"RA{k + 1}"].value == pytest.approx(pull, rel=1e-9)
+    assert {q.name for q in procedure.left_out(Plan())} == {"bearing_constant", "magnet_centre", "K_pull"}
+    assert {q.name for q in procedure.left_out(Plan(constants="calibration"))} == {"bearing_constant", "magnet_centre"}
+    assert [n.procedure for n in procedure.needs(Plan(constants="calibration"))] == ["bearing-constant"]
+
+
 def test_with_the_pole_the_centre_along_the_weight_needs_neither_mass_nor_constant() -> None:
     """g/lambda^2, 17.5 um; K by lambda^2 m over the sum of the ratios is the weighted mean of both, not either of them."""
     from bench.uncertainty import Estimate

@@ -23,6 +23,7 @@ def pulls(rig: RigFile, drawn: Truth, z_read: float, angle: float) -> dict[tuple
     out = {("pull_ratio", name): ratios[k % 2] for k, name in enumerate(RADIAL)}
     out |= {("current_free", name): x for name, x in zip(RADIAL, free, strict=True)}
     out |= {("frame_turn", name): zero for name, zero in zip(ACTUATORS, p.zero_ra, strict=True)}
+    out |= {("K_pull", name): pull for name, pull in zip(ACTUATORS, p.pull, strict=True)}
     out["lever_ratio", ""] = p.bearing_plane / p.sensor_plane
     out |= {("bearing_constant", axis): sum(p.pull) / sum(ratios) for axis in "xy"}
     out["magnet_centre", "y"] = (middle[2] + middle[3]) / 2
