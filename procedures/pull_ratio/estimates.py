@@ -68,7 +68,10 @@ class Coil:
 
 
 def result(
-    taken: Sequence[Taken], rig: RigFile, poles: Mapping[str, Estimate] | None, constants: Mapping[str, Estimate] | None = None
+    taken: Sequence[Taken],
+    rig: RigFile,
+    poles: Mapping[str, Estimate] | None,
+    constants: Mapping[str, Estimate] | None = None,
 ) -> Result:
     """All of it; as they were measured `poles`, 1/s, by `pole@` and the axis, and `constants`, N/A, by `K_B@` and the plane.
 
