@@ -25,8 +25,8 @@ OF = {
     "amb5dof": ("spindown", "step", "bearing-model", "tracking", "unbalance", "compensation", "balance", "run-up", "coast-down",
                 "sensitivity"),
     "amb1dof": ("derivative", "estimator-compare"),
-    "lira": ("loop-response", "unstable-pole", "pull-ratio", "mission", "gate-margin", "actuator-constant", "current-step",
-             "encoder-zero", "sensor-delay", "emf-constant", "cogging-map", "runout-map", "bearing-constant", "coil-map"),
+    "lira": ("loop-response", "unstable-pole", "pull-ratio", "mission", "gate-margin", "actuator-constant", "cogging-map",
+             "runout-map", "bearing-constant", "current-step", "encoder-zero", "sensor-delay", "emf-constant", "coil-map"),
 }  # fmt: skip
 PAIRS = [(rig, name) for rig, names in OF.items() for name in names]
 TABLES = ("channels", "sensors", "parameters", "geometry", "machine")
