@@ -42,4 +42,4 @@ def _figure(r: Result, turns: bool) -> Figure:
     caption = (f"What takes cogging off, by the currents and the constants: means over places of sweeps with feedforward, "
                f"the whole map laid on {shown * scale:.4g} {unit}. Up and down differ by friction alone.")  # fmt: skip
     return Figure(f"cogging-{r.map.loop}", f"Cogging: {r.map.loop}", caption, f"{r.map.loop} ({unit})", f"{what} ({per})",
-                  tuple(series), lines=(("", 0.0),))  # fmt: skip
+                  tuple(series), lines=(("zero", 0.0),))  # fmt: skip
