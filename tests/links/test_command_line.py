@@ -111,7 +111,7 @@ def listening(folder: Path, url: str) -> Callable[[], list[tuple[float, float]]]
      ("lira", "loop-response", ("axes=['z', 'gamma']",)),
      ("lira", "coil-map", ("repeats=2",)),
      ("lira", "encoder-zero", ("motors=['LA']", "repeats=3", "trial_rad=0")),
-     ("lira", "unstable-pole", ("shots=8",)),
+     ("lira", "unstable-pole", ("shots=20",)),
      ("lira", "gate-margin", ("places_m=[0.008]", "angles_rad=[-1.5, 1.5]")),
      ("lira", "pull-ratio", ("levels_m=[-2e-5, 0.0, 2e-5]", "settle_s=1")),  # by the host's clock: the rig may be behind
      ("lira", "actuator-constant", ('loops="along"',))],
