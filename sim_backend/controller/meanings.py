@@ -9,12 +9,14 @@ from typing import Final
 from bench.rigfile import RigFile
 from bench.rigfile.binding import MODES, Binding
 
-FAULTS: Final = ("LEVITATION_LOST", "OVERCURRENT", "OVERSPEED", "HEARTBEAT_LOST", "SENSOR", "LIFT_TIMEOUT")
+FAULTS: Final = ("LEVITATION_LOST", "OVERCURRENT", "OVERSPEED", "HEARTBEAT_LOST", "SENSOR", "LIFT_TIMEOUT", "STROKE",
+                 "OVERTEMPERATURE")  # fmt: skip
 """What the simulated controller latches."""
 
 NEAREST: Final[Mapping[str, tuple[str, ...]]] = {
     "LIFTING": ("READY", "LEVITATED"), "LANDING": ("LEVITATED", "READY"), "SPINNING": ("LEVITATED",),
     "COASTING": ("SPINNING", "LEVITATED"), "READY": ("OFF",), "OFF": ("READY",), "FAULT": ("OFF",), "LEVITATED": ("SPINNING",),
+    "HOMING": ("READY",), "HOLDING": ("MOVING",), "MOVING": ("HOLDING",), "STOPPING": ("MOVING", "HOLDING"),
 }  # fmt: skip
 """For a mode that no state of the DBC means: the mode that a movement comes from, until it has ended; and what holds the
 rotor as this one does. So LEVITATED is never told before the rotor stands, nor READY before it lies."""
