@@ -32,7 +32,7 @@ def state_codes(binding: Binding, choices: Mapping[int, str]) -> dict[str, int]:
             told.setdefault(mode, code)
     lowest = min(told.values(), default=0)
     modes = STAGE_MODES if "HOLDING" in told else LEVITATION_MODES
-    near = {m: next((told[n] for n in NEAREST[m] if n in told), lowest) for m in modes if m not in told}
+    near = {m: next((told[n] for n in NEAREST.get(m, ()) if n in told), lowest) for m in modes if m not in told}
     return told | near
 
 
