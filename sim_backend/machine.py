@@ -94,8 +94,8 @@ class Machine:
             then.
         motions: what it truly does under a plan.
         tick_s, period_s: of its controller, and from sample to sample of its telemetry.
-        states: its controller's states in the place of `sim_backend.controller.states.States`, of plant, machine, the controller's
-            own parameters, the owner and a planted fault's time.
+        states: its controller's states in the place of `sim_backend.controller.states.States`, of plant, machine, the
+            controller's own parameters, the owner and a planted fault's time.
         controller: what speaks for it, of rig file, truth, faults in the device and integration steps in a tick; None: the
             `SimulatedController` around its plant.
         served: what stands behind real ports; None: the `SimulatedController`, too.

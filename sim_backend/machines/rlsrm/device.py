@@ -1,15 +1,17 @@
-"""The rotary-linear motor as its simulated controller has it: parameters by the rig file's names, time in ticks of the amplifiers
-that are counted so that a reading of the loops ends a tick before a telemetry period does, readings with their sensors' errors."""
+"""The rotary-linear motor as its simulated controller has it: parameters by the rig file's names, time in ticks of the
+amplifiers that are counted so that a reading of the loops ends a tick before a telemetry period does, readings with their
+sensors' errors."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Final, Literal, overload
+from typing import Any, Final, Literal, cast, overload
 
 import numpy as np
 
 from sim_backend.core.plant import Array, DriveLaw
-from sim_backend.machines.rlsrm.params import PHASES, ControlParams, Each, Map, Pair, PlantParams
+from sim_backend.machines.rlsrm.params import PHASES, ControlParams, Each, Pair, PlantParams
 from sim_backend.machines.rlsrm.plant import AXES, FAULTS, LOOP_TICKS, READINGS, ROW, STATES, TICKS_S, Plant
 
 SHIFT: Final = LOOP_TICKS - 1
@@ -120,9 +122,7 @@ class StagePlant:
         Raises:
             KeyError: it has no such parameter.
         """
-        if name in ("lift_time_s", "watchdog_s"):  # of a controller that lifts; taken at the watchdog's own time
-            if name == "watchdog_s":
-                self.core.set(name, value)
+        if name == "lift_time_s":  # which every controller has that lifts
             return
         if name not in SETTABLE:
             raise KeyError(name)
@@ -136,9 +136,8 @@ class StagePlant:
             self._chosen = int(value) if name == "open_phase" else self._chosen
             self.core.set(OF_ALL[name], value)
         else:
-            first, _, last = name.partition("_")
-            axis, field = (first, OF_SET_POINTS[last]) if first in AXES else (last, OF_AXES[first])
-            self.core.set(field, value, axis)
+            field, axis = _of_axis(name)
+            self.core.set(field, value, AXES[axis])
 
     @overload
     def run(self, ticks: int, trace: Literal[0] = 0) -> Array: ...
@@ -177,15 +176,38 @@ class StagePlant:
         voltages[:] = np.array(s.voltage_gain) * voltages + s.voltage_offset + s.voltage_noise * noise[:, TOLD:]
 
 
-def built_of(plant: PlantParams, control: ControlParams | None = None, rest: Pair = (0.0, 0.0)) -> Built:
-    """A machine without errors of what tells its currents, for tests."""
-    return Built(plant, control or ControlParams(), rest=rest)
+def control_of(settings: Mapping[str, float]) -> ControlParams:
+    """The controller with parameters by the rig file's names, for truths that run it by themselves; set points and pulses are
+    no part of it."""
+    control: Any = ControlParams()
+    for name, value in settings.items():
+        if name.startswith("map_"):
+            control = replace(control, map=_mapped(control.map, name.removeprefix("map_"), value))
+        elif name in OF_ALL:
+            control = replace(control, **{OF_ALL[name]: value})
+        elif name == "watchdog_s":
+            control = replace(control, watchdog_s=value)
+        elif name in SETTABLE and name != "pulse_s" and not name.endswith("_target"):
+            field, axis = _of_axis(name)
+            pair = list(getattr(control, field))
+            pair[axis] = value
+            control = replace(control, **{field: tuple(pair)})
+    return cast(ControlParams, control)
 
 
-def known_by(plant: PlantParams) -> ControlParams:
-    """A controller that has the machine's own map."""
-    known = {name: getattr(plant.map, name) for name in Map.__dataclass_fields__ if not name.startswith("uneven")}
-    return replace(ControlParams(), map=Map(**known))
+def _mapped(known: Any, name: str, value: float) -> Any:
+    first, _, last = name.partition("_")
+    if not last:
+        return replace(known, **{name: value})
+    several = list(getattr(known, first))
+    several[int(last) - 1] = value
+    return replace(known, **{first: tuple(several)})
+
+
+def _of_axis(name: str) -> tuple[str, int]:
+    """Field of the controller and number of the axis."""
+    first, _, last = name.partition("_")
+    return (OF_SET_POINTS[last], AXES.index(first)) if first in AXES else (OF_AXES[first], AXES.index(last))
 
 
 def named(row: Array) -> tuple[str, str]:

@@ -1,5 +1,5 @@
-"""Who works on the rotary-linear motor: hangs weights over pulleys at both ends of its shaft and on a disc, clamps its axes, puts a
-ring on it or a bar into its bore."""
+"""Who works on the rotary-linear motor: hangs weights over pulleys at both ends of its shaft and on a disc, clamps its axes,
+puts a ring on it or a bar into its bore."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ class Attendant:
         self._hung: dict[str, str] = {}  # labels by hook or side
 
     def request(self, line: str) -> str:
-        """One line: `hang HOOK M1`, `hang HOOK -`, `lever left M1`, `lever left -`, `mount ring`, `mount bar`, `mount lock` (both
-        axes), `mount lock-along`, `mount lock-around`, `mount -` (all of these off), `ask TEXT`. Answers `ok SECONDS` (when it
-        will be done), `yes` or `error TEXT`."""
+        """One line: `hang HOOK M1`, `hang HOOK -`, `lever left M1`, `lever left -`, `mount ring`, `mount bar`, `mount lock`
+        (both axes), `mount lock-along`, `mount lock-around`, `mount -` (all of these off), `ask TEXT`. Answers `ok SECONDS`
+        (when it will be done), `yes` or `error TEXT`."""
         match line.split():
             case ["ask", *_]:
                 return "yes"

@@ -109,7 +109,7 @@ class Plant:
         _lib.rlsrm_fail(self._s, FAULTS.index(fault))
 
     def pulse(self, phase: int, seconds: float) -> None:
-        """In READY, the whole supply on the phase that is tested, until the limit of its current; held till its time is over."""
+        """In READY, the whole supply on the phase that is tested, until the current's limit; held till its time is over."""
         if self.state == "READY" and 0 <= phase < len(PHASES):
             self._s.pulse_phase, self._s.pulse_left = phase, round(seconds * TICKS_S)
 

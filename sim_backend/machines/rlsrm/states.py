@@ -1,5 +1,5 @@
-"""States of a controller that positions axes (docs/reference/protocol.md): what a command does in each is the core's; here is who
-may ask for it, whose silence is watched, and what becomes of a controller that was made safe."""
+"""States of a controller that positions axes (docs/reference/protocol.md): what a command does in each is the core's; here is
+who may ask for it, whose silence is watched, and what becomes of a controller that was made safe."""
 
 from __future__ import annotations
 
@@ -42,7 +42,8 @@ class StageStates:
     """The core sees by itself what its movements come to."""
 
     def __init__(
-        self, plant: StagePlant, _machine: Machine, parameters: Mapping[str, float], owner: Ownership, fault_after_s: float = 0.0
+        self, plant: StagePlant, _machine: Machine, parameters: Mapping[str, float], owner: Ownership,
+        fault_after_s: float = 0.0,
     ) -> None:  # fmt: skip
         self._plant, self._core, self._own, self._owner = plant, plant.core, parameters, owner
         self._planted_s = fault_after_s
@@ -76,7 +77,7 @@ class StageStates:
 
     def begin(self) -> None:
         """Before time passes: when the host was heard last."""
-        self._plant.set("watchdog_s", self._own["watchdog_s"])
+        self._core.set("watchdog_s", self._own["watchdog_s"])
         self._plant.hear(self._owner.heartbeat)
 
     def progress(self, _rows: Array) -> None:
