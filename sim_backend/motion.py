@@ -229,6 +229,44 @@ class GateAsked:
 
 
 @dataclass(frozen=True)
+class StageMode:
+    """Axes of a positioned stage that move at once; `wheres`, what results of each are called (of steps, to the first and to
+    the second place); the row of telemetry at which the mode was over; by how many rows each axis is sent after the first."""
+
+    axes: Sequence[str]
+    wheres: Mapping[str, Sequence[str]]
+    end_row: int
+    stagger: Mapping[str, int]
+
+
+@dataclass(frozen=True)
+class StepsFollowed:
+    """Axes of a positioned stage that are sent to and fro between two `places`, m or rad: `settings` as those of steps;
+    `commands` as (row, command or parameter, value), rows of telemetry from the search of the zeros on. How many rows pass
+    before each step, after it, and of these how many at rest; the band of settling, share of the step."""
+
+    settings: Numbers
+    commands: Sequence[tuple[int, str, float]]
+    modes: Sequence[StageMode]
+    places: Mapping[str, tuple[float, float]]
+    before_rows: int
+    dwell_rows: int
+    rest_rows: int
+    band: float
+
+
+@dataclass(frozen=True)
+class SinesFollowed:
+    """Axes of a positioned stage that follow sines: `settings` and `commands` as those of steps that are followed; the rows
+    of a period."""
+
+    settings: Numbers
+    commands: Sequence[tuple[int, str, float]]
+    modes: Sequence[StageMode]
+    period_rows: int
+
+
+@dataclass(frozen=True)
 class Motions:
     """The truths of motion of one machine; None: it has none of that kind. Each takes the rig and what was drawn for it (a
     `Truth`) first.
@@ -253,6 +291,7 @@ class Motions:
         gates: what the gate and the catch have to spare, by quantity and where.
         pulls: of where a channel along and one around read, what holds a shaft that magnets pull, by quantity and where.
         cogging: harmonics of it along and around, by quantity and where, of a shaft turned at rad/s at a place, m.
+        following: what axes do that are sent to and fro or follow sines, by quantity and where.
         runout: what turns with the shaft, vectors by quantity, plane and place along, m.
         speeds: at the torque limit, by sharing: `speed` rad/s, `bound` A of the torque current, `ripple` rad/s.
     """
@@ -279,6 +318,7 @@ class Motions:
     ) = None
     pulls: Callable[[RigFile, Any, float, float], Mapping[tuple[str, str], float]] | None = None
     cogging: Callable[[RigFile, Any, float, float], Mapping[tuple[str, str], float]] | None = None
+    following: Callable[[RigFile, Any, StepsFollowed | SinesFollowed], Mapping[tuple[str, str], float]] | None = None
     runout: Callable[[RigFile, Any, Sequence[float]], Mapping[tuple[str, str, float], complex]] | None = None
 
 

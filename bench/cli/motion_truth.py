@@ -15,6 +15,7 @@ from bench.cli.truths import (
     coils,
     delays,
     emf,
+    following,
     gate,
     held,
     linear_rotary,
@@ -74,5 +75,7 @@ TRUTHS: Mapping[str, Callable[[Any], Found]] = {
     "runout-map": turning.runout,
     "coil-map": coils.shares,
     "gate-margin": gate.margins,
+    "step-following": following.steps,
+    "sine-following": following.sines,
     "bearing-constant": weights.constants,
 }
