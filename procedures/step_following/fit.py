@@ -55,15 +55,14 @@ def stepped(
 ) -> Stepped:
     """One step of `step` m or rad to `target`, whose set point begins at sample `begun`; its last `rest` samples are to rest.
 
-    The reading crosses the band where the place is up to half a count from it: the slope is that of the times at which it
-    crosses half a count farther out and nearer in.
+    The place crosses the band between the times at which the reading crosses half a count farther out and nearer in: in the
+    middle, and half of that is left open. Where the band is a whole number of counts, the reading alone would be half a
+    count early, always.
     """
     way, size = (1.0 if step > 0 else -1.0), abs(step)
     t, beyond = t[begun:] - t[begun], way * (read[begun:] - target)
-    at = settling(t, beyond, band * size)
     early, late = (settling(t, beyond, band * size + side * pitch / 2) for side in (1, -1))
-    slope = 0.0 if None in (early, late) else abs(late - early) / pitch  # type: ignore[operator]
-    if late is None and at is not None:
-        slope = float(t[-1] - at) / pitch
+    at = None if early is None or late is None else (early + late) / 2
+    slope = 0.0 if early is None or late is None else (late - early) / pitch
     still = beyond[-rest:]
     return Stepped(stood(still, pitch), float(np.ptp(still)), float(beyond.max()) / size, at, slope)

@@ -18,7 +18,7 @@ class Plan(BenchPlan):
     angles_rad: tuple[float, float] = (0.0, math.radians(200))
     together: bool = True  # and once more with all axes at once
     integrators: str = "on"  # of the rig's capabilities.settings.integrators
-    lead: int = Field(1, ge=0)  # there and back before anything counts: loops remember where they come from
+    lead: int = Field(3, ge=0)  # there and back before anything counts: loops remember where they come from
     repeats: int = Field(9, ge=3)  # there and back
     before_s: float = Field(0.05, ge=0.01, le=1)  # recorded before a step
     dwell_s: float = Field(3.0, gt=0.3, le=60)  # from a step to the next one

@@ -87,6 +87,14 @@ def _column(rows: Array, name: str) -> Array:
     return rows[:, TRACE.index(name)]
 
 
+def _true(rows: Array, axis: str) -> Array:
+    """True places (n,) from the zero that was found: the mark of the angle is there once a turn."""
+    true = _column(rows, f"true_{axis}")
+    turn = 2 * math.pi if axis == "angle" else math.inf
+    turns = round(float((true - _column(rows, axis)).mean()) / turn)
+    return np.asarray(true - turns * turn) if turns else true
+
+
 def steps(replay: Replay, p: PlantParams, asked: StepsFollowed) -> Found:
     """By name and where, of ever so many steps."""
     for mode in asked.modes:
@@ -94,7 +102,7 @@ def steps(replay: Replay, p: PlantParams, asked: StepsFollowed) -> Found:
         other, found = replay.fork(), dict[tuple[str, str], list[tuple[float, ...]]]()
         for _ in range(REPEATS):
             for up in (1, 0):
-                other.run(asked.before_rows)
+                other.run(asked.before_rows - 1)
                 rows = _sent(other, {a: asked.places[a][up] for a in mode.axes}, mode.stagger, asked.dwell_rows)
                 for a in mode.axes:
                     one = _stepped(rows[mode.stagger[a] :], p, a, asked, up)
@@ -122,7 +130,7 @@ def _sent(other: Replay, targets: Mapping[str, float], stagger: Mapping[str, int
 def _stepped(rows: Array, p: PlantParams, axis: str, asked: StepsFollowed, up: int) -> tuple[float, ...]:
     low, high = asked.places[axis]
     target, way = (high if up else low), (1.0 if (high > low) == bool(up) else -1.0)
-    true = _column(rows, f"true_{axis}")
+    true = _true(rows, axis)
     size, rest = abs(high - low), asked.rest_rows
     beyond = way * (by_encoder(p, axis, true) - target)
     return (
@@ -151,7 +159,7 @@ def sines(replay: Replay, p: PlantParams, asked: SinesFollowed) -> Found:
 
 
 def _followed(rows: Array, p: PlantParams, axis: str, where: str, n: int) -> Found:
-    reference, true = _column(rows, f"ref_{axis}"), _column(rows, f"true_{axis}")
+    reference, true = _column(rows, f"ref_{axis}"), _true(rows, axis)
     place, end = by_encoder(p, axis, true), "" if axis == "x" else "_angle"
     error = place - reference
     yield f"largest_error{end}", where, float(np.abs(error).reshape(-1, n).max(axis=1).mean())
