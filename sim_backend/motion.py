@@ -229,40 +229,38 @@ class GateAsked:
 
 
 @dataclass(frozen=True)
-class StageMode:
-    """Axes of a positioned stage that move at once; `wheres`, what results of each are called (of steps, to the first and to
-    the second place); the row of telemetry at which the mode was over; by how many rows each axis is sent after the first."""
+class StageWindow:
+    """Rows of telemetry in which an axis of a positioned stage is looked at, counted from the search of its zeros on, and what
+    the result is called; of a step where it is sent from and to, m or rad."""
 
-    axes: Sequence[str]
-    wheres: Mapping[str, Sequence[str]]
-    end_row: int
-    stagger: Mapping[str, int]
+    axis: str
+    where: str
+    begin: int
+    end: int
+    places: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True)
 class StepsFollowed:
-    """Axes of a positioned stage that are sent to and fro between two `places`, m or rad: `settings` as those of steps;
-    `commands` as (row, command or parameter, value), rows of telemetry from the search of the zeros on. How many rows pass
-    before each step, after it, and of these how many at rest; the band of settling, share of the step."""
+    """Axes of a positioned stage that are sent to and fro: `settings` as those of steps; `commands` as (tick, command or
+    parameter, value) from the search of the zeros on, `windows` from the row before a set point starts until the step's end. How
+    many rows are to rest at its end; the band of settling, share of the step."""
 
     settings: Numbers
     commands: Sequence[tuple[int, str, float]]
-    modes: Sequence[StageMode]
-    places: Mapping[str, tuple[float, float]]
-    before_rows: int
-    dwell_rows: int
+    windows: Sequence[StageWindow]
     rest_rows: int
     band: float
 
 
 @dataclass(frozen=True)
 class SinesFollowed:
-    """Axes of a positioned stage that follow sines: `settings` and `commands` as those of steps that are followed; the rows
-    of a period."""
+    """Axes of a positioned stage that follow sines: `settings` and `commands` as those of steps that are followed; `windows` of
+    whole periods, and the rows of a period."""
 
     settings: Numbers
     commands: Sequence[tuple[int, str, float]]
-    modes: Sequence[StageMode]
+    windows: Sequence[StageWindow]
     period_rows: int
 
 

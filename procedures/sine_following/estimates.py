@@ -14,9 +14,10 @@ from bench.uncertainty.estimate import Array, Deviations
 from procedures.sine_following.fit import Followed, Largest, followed
 from procedures.sine_following.plan import Plan
 from procedures.sine_following.steps import Ride, amplitude
-from procedures.stages.counts import edges, erred, half_count, pitch_of, rounded, scattered, stretched
+from procedures.stages.counts import edges, erred, half_count, pitch_of, stretched
 from procedures.stages.tracks import named, where_of, without
 
+ROUNDING = "rounding of the reading"
 LARGEST, TRUE, RMS, RATIO, LAG = "largest_error", "true_largest_error", "rms_error", "amplitude_ratio", "lag"
 
 
@@ -74,19 +75,20 @@ def _of_group(g: Group, plan: Plan) -> Mapping[tuple[str, str], Estimate]:
 
 
 def side(g: Group, name: str) -> Estimate:
-    """The largest error to one side, by the encoder's scale."""
+    """The largest error to one side, by the encoder's scale; rounding repeats itself with the periods."""
     found: list[Largest] = [getattr(f, name) for f in g.found]
-    identity = f"{LARGEST}/{g.where}/{name}"
-    mean = scattered(identity, [x.value for x in found], g.axis.unit)
-    return mean + rounded(identity, g.axis, max(x.by for x in found))
+    return _rounded(f"{LARGEST}/{g.where}/{name}", [x.value for x in found], [x.u for x in found], g.axis.unit)
 
 
 def _mean(g: Group, quantity: str, name: str, unit: str) -> Estimate:
-    """Mean over periods; rounding repeats itself with them and is not averaged."""
-    identity = f"{quantity}/{g.where}"
-    u = max(getattr(f, f"u_{name}") for f in g.found)
-    off = Influence(f"rounding/{identity}", "rounding of the reading", u, unit, "B", "normal")
-    return scattered(identity, [getattr(f, name) for f in g.found], unit) + Estimate.of(0.0, off)
+    values, left = ([getattr(f, key) for f in g.found] for key in (name, f"u_{name}"))
+    return _rounded(f"{quantity}/{g.where}", values, left, unit)
+
+
+def _rounded(identity: str, values: Sequence[float], left: Sequence[float], unit: str) -> Estimate:
+    """Mean over periods with the u that rounding leaves of one: they are nearly alike, and so is their rounding."""
+    u = float(np.sqrt(np.mean(np.square(left))))
+    return Estimate.of(float(np.mean(values)), Influence(f"rounding/{identity}", ROUNDING, u, unit, "B", "normal"))
 
 
 def truly(g: Group, ahead: Estimate, behind: Estimate, plan: Plan) -> Estimate:

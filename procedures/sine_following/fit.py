@@ -1,10 +1,11 @@
 """The bare model: one axis that follows a sine, arrays in and numbers out.
 
-A reading is r = p + q, the place and its rounding, |q| <= h, half a count. Over a period of the error e = r - s from the set
-point s: the largest of e to one side is too large by 0 to h where the reading goes through many counts near it, since some
-sample is rounded up then: h/2 is taken off, and h/2 is left. Where it does not, q is one number between -h and h. Squares are
-too large by h^2/3 in the mean, which is taken off. What is left in a weighted sum of readings is that of stretches in which the
-reading stays the same: each has a q of its own, of variance h^2/3.
+A reading is r = p + q, the place and its rounding, |q| <= h, half a count. Where the reading stays the same, the place goes
+from edge to edge of a count, or stands somewhere in it. The largest of the error e = r - s from the set point s is too large
+by what the largest of many q adds: q is drawn for each stretch of one reading, laid over the averaged error, and what it adds to the
+largest is taken off. Squares are too large by h^2/3 in the mean, which is taken off. In a weighted sum of readings a stretch in
+which the place turns back has a q of its own, of variance h^2/3; one that it goes through from edge to edge has one of 1/n of
+that, for n samples.
 """
 
 from __future__ import annotations
@@ -15,15 +16,18 @@ import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
-SWEPT = 3  # counts near the largest, from which on some sample is rounded up
+NEAR = 3.0  # half counts under the largest, down to which errors may become it
+AVERAGED = 9  # samples, of the error that rounding is laid over
+DRAWS = 400
+SEED = 23
 
 
 @dataclass(frozen=True)
 class Largest:
-    """The largest error to one side, m or rad, and by how much rounding leaves it open."""
+    """The largest error to one side, m or rad, and the u that rounding leaves of it."""
 
     value: float
-    by: float
+    u: float
 
 
 @dataclass(frozen=True)
@@ -42,17 +46,29 @@ class Followed:
     u_lag: float
 
 
+def stretches(read: Array) -> npt.NDArray[np.int64]:
+    """Where stretches of one reading begin."""
+    return np.flatnonzero(np.diff(read, prepend=read[:1] - 1.0))
+
+
 def largest(error: Array, read: Array, half: float) -> Largest:
     """The largest of an error (n,) upwards."""
-    top = float(error.max())
-    near = np.unique(read[error > top - half])
-    return Largest(top - half / 2, half / 2) if len(near) >= SWEPT else Largest(top, half)
+    top, starts = float(error.max()), stretches(read)
+    even = np.convolve(np.pad(error, AVERAGED // 2, mode="edge"), np.full(AVERAGED, 1 / AVERAGED), "valid")
+    tops = np.maximum.reduceat(even, starts)
+    tops = tops[tops > tops.max() - NEAR * half]
+    drawn = np.random.default_rng(SEED).uniform(-half, half, (DRAWS, len(tops)))
+    found = (tops + drawn).max(axis=1) - tops.max()
+    return Largest(top - float(found.mean()), float(found.std(ddof=1)))
 
 
 def left_of(weights: Array, read: Array, half: float) -> float:
-    """u that rounding leaves of the sum of weights times readings (n,): each stretch of one reading has its own."""
-    starts = np.flatnonzero(np.diff(read, prepend=read[:1] - 1.0))
-    return float(half / 3**0.5 * np.sqrt((np.add.reduceat(weights, starts) ** 2).sum()))
+    """u that rounding leaves of the sum of weights times readings (n,)."""
+    starts = stretches(read)
+    counts, steps = np.diff(starts, append=len(read)), np.sign(np.diff(read))
+    before, after = steps[np.maximum(starts - 1, 0)], steps[np.minimum(starts + counts - 1, len(steps) - 1)]
+    share = np.where(before == after, 1 / counts, 1.0)
+    return float(half / 3**0.5 * np.sqrt((share * np.add.reduceat(weights, starts) ** 2).sum()))
 
 
 def fundamental(t: Array, x: Array, period: float) -> complex:

@@ -49,15 +49,15 @@ def own_error(axis: StageAxis) -> float:
 
 
 def rounded(identity: str, axis: StageAxis, by: float) -> Estimate:
-    """A zero that is known to `by`, a bound: what rounding leaves of one result."""
+    """A zero that is known to `by`, m or rad, a bound: what rounding leaves of a result."""
     return Estimate.of(
         0.0, Influence(f"rounding/{identity}", "rounding of the reading", by / BOUND, axis.unit, "B", "normal")
     )
 
 
-def rested(identity: str, axis: StageAxis) -> Estimate:
-    """A zero with the rounding of a rest, for a true place: it lies at the edges of a count rather than in its middle."""
-    u = half_count(axis) / 2**0.5
+def rested(identity: str, axis: StageAxis, share: float) -> Estimate:
+    """A zero with a share of the rounding of a rest, for a true place: at the edges of a count rather than in its middle."""
+    u = share * half_count(axis) / 2**0.5
     return Estimate.of(0.0, Influence(f"rest/{identity}", "where in its count it rests", u, axis.unit, "B", "arcsine"))
 
 
@@ -86,9 +86,8 @@ def stretched(axis: StageAxis, by: float) -> Estimate:
     return Estimate(0.0, axis.unit, {pitch: by}) if share > 0 else Estimate.exact(0.0, axis.unit)
 
 
-def scattered(identity: str, values: Sequence[float] | Array, unit: str) -> Estimate:
-    """Mean of repeats (n,), with their scatter."""
-    x = np.asarray(values, np.float64)
-    u = float(x.std(ddof=1)) / len(x) ** 0.5
-    scatter = Influence(f"scatter/{identity}", "scatter of the repeats", u, unit, "A", "normal", float(len(x) - 1))
-    return Estimate.of(float(x.mean()), scatter)
+def averaged(values: Sequence[float] | Array) -> float:
+    """What is left of a bound, such as rounding, in the mean of repeats (n,): those that read alike are off alike, those that
+    do not are off each by itself; the root of the sum of squares of the shares that read alike."""
+    _, counts = np.unique(np.round(np.asarray(values, np.float64), 12), return_counts=True)
+    return float(np.sqrt((counts**2).sum()) / counts.sum())

@@ -9,7 +9,7 @@ import numpy as np
 
 from bench.rigfile.stage import StageAxis
 from bench.uncertainty import Estimate, Influence
-from procedures.stages.counts import edges, erred, half_count, pitch_of, rested, rounded, scattered, stretched
+from procedures.stages.counts import BOUND, averaged, edges, erred, half_count, pitch_of, rested, rounded, stretched
 from procedures.stages.tracks import Mode, named, where_of, without
 from procedures.step_following.fit import Stepped, began, stepped
 from procedures.step_following.plan import Plan
@@ -74,30 +74,26 @@ def _of_group(g: Group, plan: Plan) -> Mapping[tuple[str, str], Estimate]:
     axis, where, way = g.axis, g.where, (1.0 if g.way == UP else -1.0)
     size = abs(step_of(axis, plan, g.way))
     target = places(axis, plan)[g.way == UP]
-    half = half_count(axis)
-    error = scattered(f"{ERROR}/{where}", [f.error for f in g.found], axis.unit)
+    errors, overs = [f.error for f in g.found], [f.overshoot for f in g.found]
+    half, share = half_count(axis), averaged(errors)
     beyond = edges(axis) + erred(axis, f"{target:g}") + stretched(axis, target)
-    over = scattered(f"{OVER}/{where}", [f.overshoot for f in g.found], "1")
+    over = rounded(f"{OVER}/{where}", axis, half * averaged(overs))
     out = {
-        (named(ERROR, axis), where): error + rounded(f"{ERROR}/{where}", axis, half),
-        (named(TRUE, axis), where): error + rested(f"{ERROR}/{where}", axis) - way * beyond,
-        (OVER, where): over + _share(rounded(f"{OVER}/{where}", axis, half), size),
+        (named(ERROR, axis), where): rounded(f"{ERROR}/{where}", axis, half * share) + float(np.mean(errors)),
+        (named(TRUE, axis), where): rested(f"{ERROR}/{where}", axis, share) - way * beyond + float(np.mean(errors)),
+        (OVER, where): Estimate(float(np.mean(overs)), "1", {i: c / size for i, c in over.sensitivities.items()}),
     }
     if all(f.settled is not None for f in g.found):
         out[TIME, where] = _time(g)
     return out
 
 
-def _share(off: Estimate, size: float) -> Estimate:
-    return Estimate(off.value / size, "1", {i: c / size for i, c in off.sensitivities.items()})
-
-
 def _time(g: Group) -> Estimate:
     """Settling: the band is crossed up to half a count early or late, and between two samples."""
     times = [f.settled for f in g.found if f.settled is not None]
-    slope = float(np.mean([f.slope for f in g.found]))
-    off = rounded(f"{TIME}/{g.where}", g.axis, half_count(g.axis))
+    slope, share = float(np.mean([f.slope for f in g.found])), averaged(times)
+    off = rounded(f"{TIME}/{g.where}", g.axis, half_count(g.axis) * share)
     period = float(np.median(np.diff(g.moves[0].track.t)))
-    told = Influence(f"sampling/{g.where}", "between two samples", period / 12**0.5, "s", "B", "rectangular")
-    turned = Estimate(0.0, "s", {i: c * slope for i, c in off.sensitivities.items()})
-    return scattered(f"{TIME}/{g.where}", times, "s") + turned + Estimate.of(0.0, told)
+    told = Influence(f"sampling/{g.where}", "between two samples", share * period / 2 / BOUND, "s", "B", "normal")
+    turned = Estimate(float(np.mean(times)), "s", {i: c * slope for i, c in off.sensitivities.items()})
+    return turned + Estimate.of(0.0, told)

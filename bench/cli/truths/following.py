@@ -13,88 +13,79 @@ if TYPE_CHECKING:
     from bench.cli.virtual import Simulated
 
 COMMANDS = {"HOME": "home", "HOLD": "hold", "MOVE": "play", "STOP": "stop"}
-SEEN = {"HOME": "HOMING", "HOLD": "HOLDING", "MOVE": "MOVING"}
-"""State of the first row after a command."""
 
 
 class Rows:
-    """Rows of the telemetry of a run: a command or parameter is seen in the first row after it came."""
+    """Rows of the telemetry of a run, and what was commanded by the machine's ticks, from the row on in which it begins to look
+    for its zeros. A row is read one tick before its time. Values go to the controller as 32-bit floats, and a count that is
+    read a row later sends a mover that sticks and slips another way."""
 
-    def __init__(self, recording: Any) -> None:
-        data = recording.read(("state",), 0, 1 << 62)
-        rig = recording.rig
-        self._t, names = data["t_ns"], rig.choices("state")
-        self._modes = np.array([rig.binding.mode(names.get(int(c), "")) for c in data["state"]])
-        self._period = int(np.median(np.diff(self._t)))
-        told = [(e["t_ns"], e["name"], math.nan) for e in recording.events("command") if e["name"] in COMMANDS]
-        told += [(e["t_ns"], e["name"], float(e["value"])) for e in recording.events("parameter")]
+    def __init__(self, recording: Any, tick_s: float) -> None:
+        data, rig = recording.read(("state",), 0, 1 << 62), recording.rig
+        t, names = data["t_ns"], rig.choices("state")
+        homing = [rig.binding.mode(names.get(int(c), "")) == "HOMING" for c in data["state"]]
+        self._tick, self._period = round(tick_s * 1e9), int(np.median(np.diff(t)))
+        self._zero = int(t[int(np.argmax(homing))]) - self._tick
+        told = [
+            (e["t_ns"], COMMANDS[e["name"]], math.nan) for e in recording.events("command") if e["name"] in COMMANDS
+        ]
+        told += [(e["t_ns"], e["name"], float(np.float32(e["value"]))) for e in recording.events("parameter")]
         told.sort(key=lambda e: e[0])
-        home = next(self.of(t, name) for t, name, _ in told if name == "HOME")
-        self.zero = home
-        self.commands = [
-            (self.of(t, name) - home, COMMANDS.get(name, name), value) for t, name, value in told
-            if self.of(t, name) >= home
-        ]  # fmt: skip
+        self.commands = [(max(-(-(at - self._zero) // self._tick), 0), name, value) for at, name, value in told]
 
-    def of(self, t_ns: int, name: str = "") -> int:
-        """The first row after a time, or after a command came."""
-        row = math.ceil((t_ns - int(self._t[0])) / self._period)
-        if name not in SEEN:
-            return row
-        return row + int(np.flatnonzero(self._modes[row:] == SEEN[name])[0])
+    def of(self, t_ns: int) -> int:
+        """The first row that is read at a time or after it."""
+        return -(-(t_ns - self._zero) // self._period)
 
-    def after(self, t_ns: int) -> int:
-        """As `of`, from the search of the zeros on."""
-        return self.of(t_ns) - self.zero
+    def sent(self, parameter: str, t_ns: int) -> int:
+        """The first row that knows a parameter's next value after a time."""
+        a_row = self._period // self._tick
+        begin = -(-(t_ns - self._zero) // self._tick)
+        return -(-next(tick for tick, name, _ in self.commands if name == parameter and tick >= begin) // a_row)
 
 
 def steps(done: Simulated) -> Found:
-    """Of the same machine, sent as the plan says for longer."""
-    from procedures.stages.tracks import chosen, where_of, without
-    from procedures.step_following.steps import STEP, WAYS, modes_of, places
-    from sim_backend.motion import StageMode, StepsFollowed
+    """Of the same machine that is sent the same way, of the steps that count."""
+    from procedures.stages.tracks import where_of, without
+    from procedures.step_following.steps import STEP, UP, modes_of, places
+    from sim_backend.motion import StageWindow, StepsFollowed
 
     recording, of = done.recording, done.drawn.machine.motions.following
     rig, plan = recording.rig, recording.plan
     if of is None:
         return
-    rows, modes = Rows(recording), []
-    for m in modes_of(rig, plan):
-        last = [s for s in recording.steps(STEP) if s.labels["mode"] == m.name][-1]
-        begin, end = rows.after(last.start_ns), rows.after(last.end_ns)
-        sent = {a.name: next(r for r, name, _ in rows.commands if name == a.target and r >= begin) for a in m.axes}
-        wheres = {a.name: [where_of(m, a, way, without(plan.integrators)) for way in reversed(WAYS)] for a in m.axes}
-        stagger = {name: r - min(sent.values()) for name, r in sent.items()}
-        modes.append(StageMode([a.name for a in m.axes], wheres, end, stagger))
-        dwell = end - min(sent.values())
-    between = {a.name: places(a, plan) for a in chosen(rig, plan.moved)}
-    asked = StepsFollowed(
-        settings_of(done),
-        rows.commands,
-        modes,
-        between,
-        round(plan.before_s * 1e3),
-        dwell,
-        round(plan.rest_s * 1e3),
-        plan.band,
-    )
+    rows, windows = Rows(recording, done.drawn.machine.tick_s), []
+    known = {m.name: m for m in modes_of(rig, plan)}
+    for step in recording.steps(STEP):
+        mode, way = known[step.labels["mode"]], step.labels["way"]
+        for a in mode.axes if step.labels["repeat"] >= 0 else ():
+            low, high = places(a, plan)
+            ends = (low, high) if way == UP else (high, low)
+            where = where_of(mode, a, way, without(plan.integrators))
+            windows.append(
+                StageWindow(a.name, where, rows.sent(a.target, step.start_ns) - 1, rows.of(step.end_ns), ends)
+            )
+    asked = StepsFollowed(settings_of(done), rows.commands, windows, round(plan.rest_s * 1e3), plan.band)
     yield from ((name, where, value) for (name, where), value in of(rig, done.drawn, asked).items())
 
 
 def sines(done: Simulated) -> Found:
-    """Of the same machine, following as the plan says for longer."""
+    """Of the same machine that is sent the same way, of the periods that count."""
     from procedures.sine_following.steps import SINE, modes_of
     from procedures.stages.tracks import where_of, without
-    from sim_backend.motion import SinesFollowed, StageMode
+    from sim_backend.motion import SinesFollowed, StageWindow
 
     recording, of = done.recording, done.drawn.machine.motions.following
     rig, plan = recording.rig, recording.plan
     if of is None:
         return
-    rows, modes = Rows(recording), []
-    for m in modes_of(rig, plan):
-        step = next(s for s in recording.steps(SINE) if s.labels["mode"] == m.name)
-        wheres = {a.name: [where_of(m, a, without(plan.integrators))] for a in m.axes}
-        modes.append(StageMode([a.name for a in m.axes], wheres, rows.after(step.end_ns), {}))
-    asked = SinesFollowed(settings_of(done), rows.commands, modes, round(plan.period_s * 1e3))
+    rows, windows, n = Rows(recording, done.drawn.machine.tick_s), [], round(plan.period_s * 1e3)
+    known = {m.name: m for m in modes_of(rig, plan)}
+    for step in recording.steps(SINE):
+        mode, begin = known[step.labels["mode"]], rows.of(step.start_ns)
+        windows += [
+            StageWindow(a.name, where_of(mode, a, without(plan.integrators)), begin, begin + n * plan.periods)
+            for a in mode.axes
+        ]
+    asked = SinesFollowed(settings_of(done), rows.commands, windows, n)
     yield from ((name, where, value) for (name, where), value in of(rig, done.drawn, asked).items())

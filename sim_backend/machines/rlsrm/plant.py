@@ -155,11 +155,6 @@ class Plant:
         if self.state in ("HOLDING", "MOVING"):
             self._s.target[axis] = target
 
-    def copy_to(self, other: Plant) -> None:
-        """Bring another plant of the same parameters to where this one is."""
-        _ffi.memmove(other._s, self._s, _ffi.sizeof("rlsrm_state"))
-        _ffi.memmove(other._c, self._c, _ffi.sizeof("rlsrm_control"))
-
     def know(self, name: str, value: float) -> None:
         """Set a number of the controller's own map; of several, `zero_1`, `gain_6` and the like."""
         known, (first, _, last) = self._c.map, name.partition("_")
