@@ -243,8 +243,8 @@ class StageWindow:
 @dataclass(frozen=True)
 class StepsFollowed:
     """Axes of a positioned stage that are sent to and fro: `settings` as those of steps; `commands` as (tick, command or
-    parameter, value) from the search of the zeros on, `windows` from the row before a set point starts until the step's end. How
-    many rows are to rest at its end; the band of settling, share of the step."""
+    parameter, value) from the search of the zeros on, `windows` from the row before a set point starts until the step's end.
+    How many rows are to rest at its end; the band of settling, share of the step."""
 
     settings: Numbers
     commands: Sequence[tuple[int, str, float]]

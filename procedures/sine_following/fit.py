@@ -2,10 +2,10 @@
 
 A reading is r = p + q, the place and its rounding, |q| <= h, half a count. Where the reading stays the same, the place goes
 from edge to edge of a count, or stands somewhere in it. The largest of the error e = r - s from the set point s is too large
-by what the largest of many q adds: q is drawn for each stretch of one reading, laid over the averaged error, and what it adds to the
-largest is taken off. Squares are too large by h^2/3 in the mean, which is taken off. In a weighted sum of readings a stretch in
-which the place turns back has a q of its own, of variance h^2/3; one that it goes through from edge to edge has one of 1/n of
-that, for n samples.
+by what the largest of many q adds: q is drawn for each stretch of one reading, laid over the averaged error, and what it adds
+to the largest is taken off. Squares are too large by h^2/3 in the mean, which is taken off. In a weighted sum of readings a
+stretch in which the place turns back has a q of its own, of variance h^2/3; one that it goes through from edge to edge has one
+of 1/n of that, for n samples.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 NEAR = 3.0  # half counts under the largest, down to which errors may become it
-AVERAGED = 9  # samples, of the error that rounding is laid over
+AVERAGED = 21  # samples, of the error that rounding is laid over: fewer leave rounding in it, more take off its peaks
+KNOWN = 0.1  # of what rounding adds: how well that is known, by the same on errors whose places were known
 DRAWS = 400
 SEED = 23
 
@@ -46,29 +47,33 @@ class Followed:
     u_lag: float
 
 
-def stretches(read: Array) -> npt.NDArray[np.int64]:
-    """Where stretches of one reading begin."""
-    return np.flatnonzero(np.diff(read, prepend=read[:1] - 1.0))
+def stretches(read: Array) -> tuple[npt.NDArray[np.int64], Array]:
+    """Where stretches of one reading (n,) begin, and how many samples each takes from edge to edge; 1 where the place turns
+    back in it, which says nothing of where in the count that was."""
+    starts = np.flatnonzero(np.diff(read, prepend=read[:1] - 1.0))
+    counts, steps = np.diff(starts, append=len(read)), np.sign(np.diff(read))
+    between = np.append(0.0, np.append(steps[starts[1:] - 1], 0.0))  # ways into and out of each; none at either end
+    through = (between[:-1] == between[1:]) & (between[:-1] != 0)
+    return starts, np.where(through, counts, 1).astype(np.float64)
 
 
 def largest(error: Array, read: Array, half: float) -> Largest:
-    """The largest of an error (n,) upwards."""
-    top, starts = float(error.max()), stretches(read)
+    """The largest of an error (n,) upwards. A place that takes n samples from edge to edge is rounded up by all of h but for
+    one n-th of a count at some sample."""
+    top, (starts, through) = float(error.max()), stretches(read)
     even = np.convolve(np.pad(error, AVERAGED // 2, mode="edge"), np.full(AVERAGED, 1 / AVERAGED), "valid")
     tops = np.maximum.reduceat(even, starts)
-    tops = tops[tops > tops.max() - NEAR * half]
-    drawn = np.random.default_rng(SEED).uniform(-half, half, (DRAWS, len(tops)))
-    found = (tops + drawn).max(axis=1) - tops.max()
-    return Largest(top - float(found.mean()), float(found.std(ddof=1)))
+    near = tops > tops.max() - NEAR * half
+    drawn = half - 2 * half * np.random.default_rng(SEED).random((DRAWS, int(near.sum()))) / through[near]
+    found = (tops[near] + drawn).max(axis=1) - tops.max()
+    added, left = float(found.mean()), float(found.std(ddof=1))
+    return Largest(top - added, float(np.hypot(left, KNOWN * added)))
 
 
 def left_of(weights: Array, read: Array, half: float) -> float:
     """u that rounding leaves of the sum of weights times readings (n,)."""
-    starts = stretches(read)
-    counts, steps = np.diff(starts, append=len(read)), np.sign(np.diff(read))
-    before, after = steps[np.maximum(starts - 1, 0)], steps[np.minimum(starts + counts - 1, len(steps) - 1)]
-    share = np.where(before == after, 1 / counts, 1.0)
-    return float(half / 3**0.5 * np.sqrt((share * np.add.reduceat(weights, starts) ** 2).sum()))
+    starts, through = stretches(read)
+    return float(half / 3**0.5 * np.sqrt((np.add.reduceat(weights, starts) ** 2 / through).sum()))
 
 
 def fundamental(t: Array, x: Array, period: float) -> complex:

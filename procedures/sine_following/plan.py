@@ -26,6 +26,6 @@ class Plan(BenchPlan):
         1.0, ge=0, le=10
     )  # at first, in which set points go to the sine by the controller's rate and rise
     lead: int = Field(1, ge=1)  # periods before those that count
-    periods: int = Field(9, ge=3)
+    periods: int = Field(9, ge=1)
     max_off: float = Field(0.01, gt=0, lt=0.5)  # share of the amplitude by which set points may be off the plan's sine
     max_lost: float = Field(1e-3, ge=0)  # share of a step's samples

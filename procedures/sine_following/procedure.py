@@ -1,7 +1,7 @@
 """Sines that a positioned stage follows, each axis alone and all at once: errors, amplitude ratio and lag.
 
-Measurands, by axis and mode, means over ever so many periods: the largest |place - set point| of a period by the encoder's own
-scale and as it truly is, and its rms; the fundamental of the place over that of the set point, and how late it is.
+Measurands, by axis and mode, means over the periods that count: the largest |place - set point| of a period by the encoder's
+own scale and as it truly is, and its rms; the fundamental of the place over that of the set point, and how late it is.
 """
 
 from __future__ import annotations
@@ -144,7 +144,6 @@ procedure = Procedure(
     steps_on=lambda rig, plan: len(modes_of(rig, plan)),
     untold=lambda rig: tracks.untold(rig, PAIRS),
     left_out=lambda plan: tracks.left_out(plan.moved, PAIRS),
-    reached=("scatter/*",),
     assumes=assumptions.FOLLOWING,
     places=(TOGETHER, "integrators off"),
     method=read_method(__file__),

@@ -12,7 +12,7 @@ from bench.rigfile import RigFile
 from bench.rigfile.stage import StageAxis
 from procedures.stages.counts import half_count, pitch_of
 from procedures.stages.tracks import STANDS, Track, of_forces, of_signals, where_of
-from procedures.step_following.estimates import ERROR, OVER, TIME, TRUE, Group
+from procedures.step_following.estimates import ERROR, TIME, TRUE, Group
 from procedures.step_following.fit import began
 from procedures.step_following.plan import Plan
 from procedures.step_following.steps import STEP, UP, Move, modes_of, places, step_of
@@ -84,8 +84,8 @@ def _of_group(g: Group, plan: Plan) -> Iterator[Finding]:
     if late := sum(f.settled is None for f in g.found):
         text = f"in {late} of {len(g.found)} steps the axis is outside ±{plan.band:.0%} of the step at the end"
         yield Finding("not-settled", text, g.where, Effect.INDETERMINATE, (f"{TIME}@{g.where}",))
-    first, rest = g.found[0].error, np.array([f.error for f in g.found[1:]])
-    if abs(first - float(np.median(rest))) > 6 * float(np.ptp(rest)) + 2 * pitch_of(axis):
-        text = (f"the first step ends {told(axis, first)} beyond its set point, the others "
-                f"{told(axis, float(np.median(rest)))}: more steps before (lead) would let the loops forget")  # fmt: skip
-        yield Finding("first-differs", text, g.where, Effect.NOTE, (ERROR, OVER))
+    errors = np.array([f.error for f in g.found])
+    if float(np.ptp(errors)) > STANDS * pitch_of(axis):
+        text = (f"repeats stand {told(axis, float(errors.min()))} to {told(axis, float(errors.max()))} beyond the set point, "
+                f"with a standard deviation of {told(axis, float(errors.std(ddof=1)))}: the result is their mean")  # fmt: skip
+        yield Finding("repeats-apart", text, g.where)

@@ -41,28 +41,34 @@ def stood(rest: Array, pitch: float) -> float:
     return (low + high) / 2 if high - low < STANDS * pitch else float(rest.mean())
 
 
-def settling(t: Array, beyond: Array, band: float) -> float | None:
-    """When |beyond| (n,) is in the band for good, s: between its last sample outside and the next one."""
+def crossing(t: Array, beyond: Array, band: float) -> tuple[float, float] | None:
+    """When a reading (n,) is within a band for good, s: between its last sample outside and the next one; and its last
+    |reading| outside. None where it never is."""
     outside = np.flatnonzero(np.abs(beyond) > band)
     if not len(outside):
-        return 0.0
+        return 0.0, band
     last = int(outside[-1])
-    return float((t[last] + t[last + 1]) / 2) if last + 1 < len(t) else None
+    return (float((t[last] + t[last + 1]) / 2), abs(float(beyond[last]))) if last + 1 < len(t) else None
+
+
+def settling(t: Array, beyond: Array, band: float, pitch: float) -> tuple[float, float] | None:
+    """When the place is within a band for good, s, and by how much that changes for each m or rad: it passes the inner edges of
+    the last counts that lie wholly outside and partly outside at the times at which the reading leaves these, and goes on
+    evenly between them. None where it is outside at the end."""
+    early, late = (crossing(t, beyond, band + side * pitch / 2) for side in (1, -1))
+    if early is None or late is None:
+        return None
+    way, time = early[1] - late[1], late[0] - early[0]
+    share = (early[1] - pitch / 2 - band) / way if way > 0 else 0.5
+    return early[0] + time * min(max(share, 0.0), 1.0), time / pitch
 
 
 def stepped(
     t: Array, read: Array, target: float, step: float, begun: int, rest: int, band: float, pitch: float
 ) -> Stepped:
-    """One step of `step` m or rad to `target`, whose set point begins at sample `begun`; its last `rest` samples are to rest.
-
-    The place crosses the band between the times at which the reading crosses half a count farther out and nearer in: in the
-    middle, and half of that is left open. Where the band is a whole number of counts, the reading alone would be half a
-    count early, always.
-    """
+    """One step of `step` m or rad to `target`, whose set point begins at sample `begun`; its last `rest` samples are a rest."""
     way, size = (1.0 if step > 0 else -1.0), abs(step)
     t, beyond = t[begun:] - t[begun], way * (read[begun:] - target)
-    early, late = (settling(t, beyond, band * size + side * pitch / 2) for side in (1, -1))
-    at = None if early is None or late is None else (early + late) / 2
-    slope = 0.0 if early is None or late is None else (late - early) / pitch
+    at, slope = settling(t, beyond, band * size, pitch) or (None, 0.0)
     still = beyond[-rest:]
     return Stepped(stood(still, pitch), float(np.ptp(still)), float(beyond.max()) / size, at, slope)

@@ -19,7 +19,7 @@ class Plan(BenchPlan):
     together: bool = True  # and once more with all axes at once
     integrators: str = "on"  # of the rig's capabilities.settings.integrators
     lead: int = Field(3, ge=0)  # there and back before anything counts: loops remember where they come from
-    repeats: int = Field(9, ge=3)  # there and back
+    repeats: int = Field(9, ge=2)  # there and back
     before_s: float = Field(0.05, ge=0.01, le=1)  # recorded before a step
     dwell_s: float = Field(3.0, gt=0.3, le=60)  # from a step to the next one
     rest_s: float = Field(0.2, gt=0, le=5)  # at its end, in which the axis is to stand

@@ -2,7 +2,7 @@
 
 Measurands, by axis, mode and way: where the axis stands in the last part of a step less its set point, positive beyond it, by
 the encoder's own scale and as it truly is; the farthest it gets beyond it, share of the step; from the set point's start until
-it stays in a band. Means over ever so many such steps.
+it stays in a band. Means over the steps that count.
 """
 
 from __future__ import annotations
@@ -126,7 +126,6 @@ procedure = Procedure(
     optional=(SETTLING,),
     untold=lambda rig: tracks.untold(rig, PAIRS),
     left_out=lambda plan: tracks.left_out(plan.moved, PAIRS),
-    reached=("scatter/*",),
     assumes=assumptions.FOLLOWING,
     places=("up", "down", tracks.TOGETHER, "integrators off"),
     method=read_method(__file__),

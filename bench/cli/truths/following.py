@@ -41,7 +41,8 @@ class Rows:
         """The first row that knows a parameter's next value after a time."""
         a_row = self._period // self._tick
         begin = -(-(t_ns - self._zero) // self._tick)
-        return -(-next(tick for tick, name, _ in self.commands if name == parameter and tick >= begin) // a_row)
+        tick: int = next(tick for tick, name, _ in self.commands if name == parameter and tick >= begin)
+        return -(-tick // a_row)
 
 
 def steps(done: Simulated) -> Found:

@@ -34,8 +34,9 @@ def following(rig: RigFile, drawn: Truth, asked: StepsFollowed | SinesFollowed) 
     rows = replayed(plant, asked.settings, asked.commands, max(w.end for w in asked.windows))
     found: dict[tuple[str, str], list[float]] = {}
     for w in asked.windows:
-        one = _step if isinstance(asked, StepsFollowed) else _sine
-        for name, value in one(rows[w.begin : w.end], built.plant, w, asked):  # type: ignore[operator]
+        cut, p = rows[w.begin : w.end], built.plant
+        told = _step(cut, p, w, asked) if isinstance(asked, StepsFollowed) else _sine(cut, p, w, asked)
+        for name, value in told:
             found.setdefault((name, w.where), []).append(value)
     if plant.core.fault != "NONE":
         return {}
