@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -24,10 +25,13 @@ class Ride:
 
     def periods(self, plan: Plan) -> list[slice]:
         """Samples of each whole period that was asked for."""
-        if len(self.track.t) < 3:
+        t = self.track.t
+        if len(t) < 3:
             return []
-        n = round(plan.period_s / float(np.median(np.diff(self.track.t))))
-        return [slice(k * n, (k + 1) * n) for k in range(plan.periods) if (k + 1) * n <= len(self.track.t)]
+        step = float(np.median(np.diff(t)))
+        whole = [k for k in range(plan.periods) if t[-1] + 1.5 * step >= (k + 1) * plan.period_s]
+        ends = np.searchsorted(t, plan.period_s * np.arange(len(whole) + 1) - step / 2)
+        return [slice(int(a), int(b)) for a, b in pairwise(ends)]
 
 
 def amplitude(axis: StageAxis, plan: Plan) -> float:

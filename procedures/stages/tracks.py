@@ -25,6 +25,7 @@ TOGETHER = "together"
 INTEGRATORS = "integrators"
 STANDS = 1.5  # counts, in which a reading that stands may change
 LIMIT = 0.999  # of a loop's greatest force: it is there
+NEARLY = 0.97  # of the greatest current that the controller allows: it is there
 SERVED = 0.05  # of a loop's greatest force, that what it gets may be off what it asks
 SHARE = 2e-3  # of samples, for which that may be so
 Moved = Literal["all", "stroke", "angle"]
@@ -41,7 +42,8 @@ class Mode:
 @dataclass(frozen=True)
 class Track:
     """One axis over one step: `t` (n,) s from its first sample on, its reading and its set point, m or rad, what its loop asks
-    for and what it gets, N or N m (empty where not bound); modes that the controller was in; samples lost and expected."""
+    for and what it gets, N or N m (empty where not bound); modes that the controller was in; samples lost and expected; in what
+    share of them a motor's current was at the controller's limit."""
 
     axis: StageAxis
     t: Array
@@ -52,6 +54,7 @@ class Track:
     modes: tuple[str, ...]
     lost: int
     expected: int
+    full: float = 0.0
 
 
 def chosen(rig: RigFile, moved: Moved) -> tuple[StageAxis, ...]:
@@ -130,20 +133,29 @@ def requires(rig: RigFile, parts: Sequence[str] = ()) -> Requires:
     )  # fmt: skip
 
 
+def currents_of(rig: RigFile) -> tuple[str, ...]:
+    """Channels of the motors' currents, of a controller that has a limit for them."""
+    if rig.capabilities.current_limit not in rig.parameters:
+        return ()
+    return tuple(c for motor in rig.motors.values() for c in motor.currents if c in rig.channels)
+
+
 def tracks_of(recording: Recording[Any], step: Step, axes: Iterable[StageAxis]) -> dict[str, Track]:
     """Tracks by the axes' names."""
-    axes = tuple(axes)
-    names = [c for a in axes for c in (a.channel, a.reference, a.asked, a.given) if c]
-    data = step.read(*dict.fromkeys((*names, STATE)))
-    t = (data["t_ns"] - data["t_ns"][:1]) * 1e-9
-    codes = recording.rig.choices(STATE)
+    rig, axes = recording.rig, tuple(axes)
+    names, currents = [c for a in axes for c in (a.channel, a.reference, a.asked, a.given) if c], currents_of(rig)
+    data = step.read(*dict.fromkeys((*names, *currents, STATE)))
+    t, codes, empty = (data["t_ns"] - data["t_ns"][:1]) * 1e-9, rig.choices(STATE), np.empty(0)
     told = tuple(codes.get(int(c), str(int(c))) for c in np.unique(data[STATE]))
-    found = tuple(recording.rig.binding.mode(name) or name for name in told)
-    empty = np.empty(0)
+    found = tuple(rig.binding.mode(name) or name for name in told)
+    full = 0.0
+    if currents and len(t):
+        limit = rig.parameters[rig.capabilities.current_limit].default
+        full = float((np.max([np.abs(data[c]) for c in currents], axis=0) > NEARLY * limit).mean())
     return {
         a.name: Track(
             a, t, data[a.channel], data[a.reference], data.get(a.asked, empty), data.get(a.given, empty), found,
-            step.lost(), step.expected(),
+            step.lost(), step.expected(), full,
         )
         for a in axes
     }  # fmt: skip
@@ -169,9 +181,13 @@ def of_signals(tracks: Mapping[str, Sequence[Track]], max_lost: float) -> Iterat
 
 
 def of_forces(rig: RigFile, tracks: Mapping[str, Sequence[Track]]) -> Iterator[Finding]:
-    """Loops that ask for all they may, and demands that are not served: what is measured then is that of the limits."""
+    """Loops that ask for all they may, currents at their limit, demands that are not served: what is measured then is that of
+    the limits."""
     for where, some in tracks.items():
         axis = some[0].axis
+        if (share := float(np.mean([t.full for t in some]))) > SHARE:
+            text = f"a motor's current is at the controller's limit in {share:.1%} of the samples"
+            yield Finding("current-saturated", text, where)
         parameter = rig.parameters.get(axis.limit)
         asked, given = (np.concatenate([getattr(t, k) for t in some]) for k in ("asked", "given"))
         if parameter is None or not len(asked):

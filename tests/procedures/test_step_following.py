@@ -128,6 +128,20 @@ def moves(offset: float = 0.0, rest: float = 0.0, lost: int = 0, states: tuple[s
     return out, plan
 
 
+def test_what_is_told_of_limits() -> None:
+    """A loop that asks for 9 N of 9, gets 5, with a phase at its 6 A."""
+    some, plan = moves()
+    pushed = [
+        replace(m, track=replace(m.track, asked=np.full(3000, 9.0), given=np.full(3000, 5.0), full=0.5)) for m in some
+    ]
+    assert set(of_groups((pushed, plan))) == {
+        "force-at-limit",
+        "force-not-given",
+        "current-saturated",
+        "reading-quantised",
+    }
+
+
 def of_moves(found: tuple[list[Move], Plan]) -> set[str]:
     return {f.code for f in checks.of_moves(found[0], RLSRM, found[1])}
 
