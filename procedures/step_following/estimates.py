@@ -15,6 +15,7 @@ from procedures.step_following.fit import Stepped, began, stepped
 from procedures.step_following.plan import Plan
 from procedures.step_following.steps import UP, Move, places, step_of
 
+EVEN = 0.25  # of half a count: an eighth of a whole one
 ERROR, TRUE, OVER, TIME = "static_error", "true_static_error", "overshoot", "settling_time"
 
 
@@ -89,10 +90,11 @@ def _of_group(g: Group, plan: Plan) -> Mapping[tuple[str, str], Estimate]:
 
 
 def _time(g: Group) -> Estimate:
-    """Settling: the band is crossed up to half a count early or late, and between two samples."""
+    """Settling: where the rate changes by no more than itself from edge to edge of a count, the place is up to an eighth of
+    that time off its straight line; the edges are passed between two samples."""
     times = [f.settled for f in g.found if f.settled is not None]
     slope, share = float(np.mean([f.slope for f in g.found])), averaged(times)
-    off = rounded(f"{TIME}/{g.where}", g.axis, half_count(g.axis) * share)
+    off = rounded(f"{TIME}/{g.where}", g.axis, EVEN * half_count(g.axis) * share)
     period = float(np.median(np.diff(g.moves[0].track.t)))
     told = Influence(f"sampling/{g.where}", "between two samples", share * period / 2 / BOUND, "s", "B", "normal")
     turned = Estimate(float(np.mean(times)), "s", {i: c * slope for i, c in off.sensitivities.items()})

@@ -18,10 +18,10 @@ class Plan(BenchPlan):
     angles_rad: tuple[float, float] = (0.0, math.radians(200))
     together: bool = True  # and once more with all axes at once
     integrators: str = "on"  # of the rig's capabilities.settings.integrators
-    lead: int = Field(3, ge=0)  # there and back before anything counts: loops remember where they come from
-    repeats: int = Field(9, ge=2)  # there and back
+    lead: int = Field(2, ge=0)  # there and back before anything counts: loops remember where they come from
+    repeats: int = Field(5, ge=2)  # there and back
     before_s: float = Field(0.05, ge=0.01, le=1)  # recorded before a step
-    dwell_s: float = Field(3.0, gt=0.3, le=60)  # from a step to the next one
+    dwell_s: float = Field(5.0, gt=0.3, le=60)  # from a step to the next one
     rest_s: float = Field(0.2, gt=0, le=5)  # at its end, in which the axis is to stand
     band: float = Field(0.02, gt=0, lt=0.5)  # of settling, share of the step
     max_moved: float = Field(1e-3, gt=0)  # share of the step by which an axis that rests may move
