@@ -76,10 +76,11 @@ def _run(plant: StagePlant, ticks: int) -> Array:
 
 
 def by_encoder(p: PlantParams, axis: str, true: Array) -> Array:
-    """True places (n,) by the scale of an encoder whose counts are infinitely fine."""
+    """True places (n,) by the scale of which readings are the nearest counts; of an encoder that gives the next lower count, that
+    is half a count lower."""
     k = AXES.index(axis)
     seen = true * (1 + p.scale) if axis == "x" else true + p.once * np.sin(true - p.once_phase)
-    return np.asarray(seen + p.edge[k] * p.pitch[k])
+    return np.asarray(seen + (p.edge[k] - 0.5 * (p.truncate[k] != 0)) * p.pitch[k])
 
 
 def _looked(rows: Array, axis: str) -> tuple[Array, Array]:
