@@ -76,8 +76,8 @@ def _run(plant: StagePlant, ticks: int) -> Array:
 
 
 def by_encoder(p: PlantParams, axis: str, true: Array) -> Array:
-    """True places (n,) by the scale of which readings are the nearest counts; of an encoder that gives the next lower count, that
-    is half a count lower."""
+    """True places (n,) by the scale of which readings are the nearest counts; of an encoder that gives the next lower count,
+    that is half a count lower."""
     k = AXES.index(axis)
     seen = true * (1 + p.scale) if axis == "x" else true + p.once * np.sin(true - p.once_phase)
     return np.asarray(seen + (p.edge[k] - 0.5 * (p.truncate[k] != 0)) * p.pitch[k])
