@@ -22,7 +22,7 @@ from procedures.load_response.estimates import (
     named,
 )
 from procedures.load_response.plan import Plan
-from procedures.load_response.steps import Change, Rest
+from procedures.load_response.steps import Change, Looked, Rest
 from procedures.shared import signals
 
 HELD = ("HOLDING", "MOVING")
@@ -34,7 +34,7 @@ CONSTANT = 0.05  # of friction: a constant force that is told
 
 def of_signals(rests: Sequence[Rest], found: Sequence[Change], rig: RigFile, plan: Plan) -> Iterator[Finding]:
     """Nothing recorded, not held, losses, at the limit, not at rest, a load that nothing answers."""
-    steps = [*rests, *found]
+    steps: list[Looked] = [*rests, *found]
     if not steps:
         yield Finding(
             "no-loads", "found no load; expected those of the plan (was the run stopped early?)", "", Effect.ERROR
@@ -53,11 +53,11 @@ def of_signals(rests: Sequence[Rest], found: Sequence[Change], rig: RigFile, pla
         yield from _unanswered([c for c in found if c.axis == name], name)
 
 
-def _where(s: Rest | Change) -> str:
+def _where(s: Looked) -> str:
     return f"{s.axis}, {s.load_name}"
 
 
-def _limited(steps: Sequence[Rest | Change], axis: str) -> Iterator[Finding]:
+def _limited(steps: Sequence[Looked], axis: str) -> Iterator[Finding]:
     hit = [s for s in steps if s.limited > 0]
     if hit:
         worst = max(hit, key=lambda s: s.limited)
@@ -109,8 +109,8 @@ def _stuck(s: Static) -> Iterator[Finding]:
     turns = s.axis.unit == "rad"
     if s.moved.min() < MOVED:
         at = int(np.argmin(s.moved))
-        text = (f"moved past and back, the axis went {s.moved[at]:.0%} of the way ({MOVED:.0%} expected at least): friction or "
-                "a brake holds it. Neither compliance nor friction is stated. Move further past: lead_m, lead_rad.")  # fmt: skip
+        text = (f"moved past and back, the axis went {s.moved[at]:.0%} of the way ({MOVED:.0%} expected at least): friction "
+                "or a brake holds it. Neither compliance nor friction is stated. Move further past: lead_m, lead_rad.")  # fmt: skip
         yield Finding(
             "load-stuck", text, f"{s.axis.name}, {s.loads[at].name}", Effect.INDETERMINATE, _static(s.axis.name, turns)
         )
@@ -188,9 +188,9 @@ def _constant(s: Static) -> Iterator[Finding]:
 
 
 def _driven(answered: Sequence[Answered]) -> Iterator[Finding]:
-    """A load that is put on drives the axis its own way at first: the greatest deviation is far beyond what is left."""
+    """A load that is put on drives the axis its own way, farther than the integrator takes it beyond on its way back."""
     for a in answered:
-        back = a.answers.peak.mean()
-        if a.on and back < 2 * abs(a.answers.left.mean()) and a.answers.left.mean() < 0:
-            text = "the load drove the axis the other way: it hangs on the other side, or the encoder counts against the rig file."
+        if a.on and a.answers.against.mean() > a.answers.peak.mean():
+            text = ("the load drove the axis the other way: it hangs on the other side, or the encoder counts against the rig "
+                    "file.")  # fmt: skip
             yield Finding("load-on-wrong-side", text, a.where, Effect.ERROR)

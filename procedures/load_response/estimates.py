@@ -28,6 +28,7 @@ COMPLIANCE, BAND, FRICTION, SCALE, PEAK, LEFT = (
     "peak",
     "error_after",
 )
+ROUNDED = "counts, by set points spread over one"
 MOVED = 0.2  # of the lead: an approach that went less far did not leave friction's other side
 
 
@@ -197,8 +198,8 @@ def _band(s: Static) -> Estimate:
     out = Estimate.of(float(rows.mean()) + half, Influence(f"scatter/{name}/band", "scatter of the loads", u, unit, "A",
                                                            "normal", len(rows) - 1))  # fmt: skip
     if half:
-        rounded = Influence(f"rounding/{name}/band", "counts, by set points spread over one", half / points / math.sqrt(3), unit,
-                            "B", "rectangular")  # fmt: skip
+        u = half / points / math.sqrt(3)
+        rounded = Influence(f"rounding/{name}/band", ROUNDED, u, unit, "B", "rectangular")
         out = out + Estimate.of(0.0, rounded)
     return out
 
@@ -243,24 +244,23 @@ def answers(axis: StageAxis, found: Sequence[Change], rig: RigFile, plan: Plan) 
                                     "the run stopped early?)")  # fmt: skip
             sign = load.source.sign if on else -load.source.sign
             rows = [fit.answer(c.times, sign * c.deviation, plan.after_s, plan.look_s) for c in some]
-            peak, left = np.array(rows).T
-            out.append(Answered(axis, load, on, fit.Answers(peak, left)))
+            out.append(Answered(axis, load, on, fit.Answers(*np.array(rows).T)))
     return out
 
 
 def _of_answers(some: Sequence[Answered], plan: Plan) -> Found:
     """Means over the set points; they scatter alike under all loads of an axis, on and off."""
     out: Found = {}
-    for name, which in ((PEAK, lambda a: a.answers.peak), (LEFT, lambda a: a.answers.left)):
-        rows = np.array([which(a) for a in some])
+    for name, key in ((PEAK, "peak"), (LEFT, "left")):
+        rows = np.array([getattr(a.answers, key) for a in some])
         s, dof = fit.scatter(rows)
         for a, row in zip(some, rows, strict=True):
             u = s / math.sqrt(len(row))
-            e = Estimate.of(float(row.mean()), Influence(f"scatter/{name}/{a.where}", "scatter of the set points", u, a.axis.unit,
-                                                         "A", "normal", dof))  # fmt: skip
-            width = count(a.axis) / 2 / plan.phases / math.sqrt(3)
-            if width:
-                e = e + Estimate.of(0.0, Influence(f"rounding/{name}/{a.where}", "counts, by set points spread over one", width,
-                                                   a.axis.unit, "B", "rectangular"))  # fmt: skip
+            unit = a.axis.unit
+            points = Influence(f"scatter/{name}/{a.where}", "scatter of the set points", u, unit, "A", "normal", dof)
+            e = Estimate.of(float(row.mean()), points)
+            if width := count(a.axis) / 2 / plan.phases / math.sqrt(3):
+                rounded = Influence(f"rounding/{name}/{a.where}", ROUNDED, width, unit, "B", "rectangular")
+                e = e + Estimate.of(0.0, rounded)
             out[named(name, a.axis.unit == "rad"), a.where] = e
     return out

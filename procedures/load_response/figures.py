@@ -46,7 +46,8 @@ def _loop(s: Static, r: Result) -> Figure:
                f"at {k} set points spread over one count. Friction holds it anywhere between.")  # fmt: skip
     return Figure(f"loads-{s.axis.name}", f"Under loads, {s.axis.name}", caption, f"load / ({s.axis.force})",
                   f"deviation of {s.axis.name} / {unit}",
-                  (Series("upwards", x, up, "points"), Series("downwards", x, down, "points"), Series(label, ends, line)))  # fmt: skip
+                  (Series("upwards", x, up, "points"), Series("downwards", x, down, "points"),
+                   Series(label, ends, line)))  # fmt: skip
 
 
 def _after(axis: StageAxis, some: Sequence[Answered], found: Sequence[Change], plan: Plan) -> Figure:

@@ -99,17 +99,20 @@ def pairwise(force: Array, of: Array, masses: Array) -> list[float]:
 
 @dataclass(frozen=True)
 class Answers:
-    """To one kind of change, over set points: signed greatest deviation in the load's direction and error at the end, (K,)."""
+    """To one kind of change, over set points (K,): greatest deviation in the load's direction, error at the end, and the greatest
+    deviation `against` that direction."""
 
     peak: Array
     left: Array
+    against: Array
 
 
-def answer(times: Array, deviation: Array, after_s: float, look_s: float) -> tuple[float, float]:
-    """Greatest deviation within `after_s` after the change, and its mean over `look_s` from then on; `deviation` is positive
-    in the direction in which the load drives the axis."""
+def answer(times: Array, deviation: Array, after_s: float, look_s: float) -> tuple[float, float, float]:
+    """Greatest deviation within `after_s` after the change, its mean over `look_s` from then on, and the greatest against the load;
+    `deviation` is positive in the direction in which the load drives the axis."""
     within = (times >= 0) & (times <= after_s)
     late = (times >= after_s) & (times <= after_s + look_s)
     if not late.any():
         raise AnalysisError(f"found no sample {after_s:g} s after the load; expected a step that is longer")
-    return float(deviation[within].max()), float(deviation[late].mean())
+    path = deviation[within]
+    return float(path.max()), float(deviation[late].mean()), float(-path.min())

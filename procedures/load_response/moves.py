@@ -1,4 +1,4 @@
-"""What the machine does: an axis is moved past and back under each load, and loads are put on and taken off while it is held."""
+"""What the machine does: axes are moved past and back under each load, and loads put on and taken off while they are held."""
 
 from __future__ import annotations
 

@@ -52,6 +52,10 @@ AFTER = (
     Quantity(LEFT, "m", REST, title="error after"),
     Quantity("error_after_angle", "rad", REST, title="error after, around"),
 )
+NO_LOADS = (
+    "hooks, levers: found none that load an axis both ways; expected hooks along the shaft to both ends, or levers on both "
+    "sides"
+)
 MEASURES = (*STATIC, *AFTER)
 
 
@@ -132,8 +136,7 @@ def requires(rig: RigFile) -> Requires:
     axes, wanted = loaded(rig), ("positioning", f"settings.{INTEGRATORS}")
     if rig.capabilities.positioning is None:
         return Requires(roles=("motion", "operator"), capabilities=wanted)
-    lacks = [] if axes else ["hooks, levers: found none that load an axis both ways; expected hooks along the shaft to both "
-                             "ends, or levers on both sides"]  # fmt: skip
+    lacks = [] if axes else [NO_LOADS]
     for axis in axes:
         bound = {"rate": axis.rate, "stiffness": axis.stiffness, "reference": axis.reference, "asked": axis.asked}
         if missing := [key for key, name in bound.items() if not name]:

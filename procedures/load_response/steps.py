@@ -22,7 +22,7 @@ FEWEST = 20  # samples of a step
 
 
 @dataclass(frozen=True)
-class Step_:
+class Looked:
     """Labels and health of a step. `stiffness` and `limit` as the controller had them; `limited`: share of the samples at the
     limit; states, samples lost and expected."""
 
@@ -44,7 +44,7 @@ class Step_:
 
 
 @dataclass(frozen=True)
-class Rest(Step_):
+class Rest(Looked):
     """One approach with `side` 1 upwards, -1 downwards. Means at rest of the `reading`, m or rad, of the set point and of the
     force `given`, N or N m; `asked` of the loop; `drift` of the reading at rest, `moved`, how far the approach went."""
 
@@ -63,7 +63,7 @@ class Rest(Step_):
 
 
 @dataclass(frozen=True)
-class Change(Step_):
+class Change(Looked):
     """A load put `on` or taken off: `times` s since it was seen, and the `deviation` (n,) of the reading from the set point,
     m or rad; `seen`: whether the reading answered at all."""
 
@@ -106,7 +106,7 @@ def _told(recording: Recording[Plan], step: Step) -> tuple[dict[str, npt.NDArray
     states = tuple(known.get(int(code), str(int(code))) for code in np.unique(data[STATE]))
     limit, force = float(labels["limit"]), np.abs(data[axis.asked])
     limited = float(np.mean(force >= AT_LIMIT * limit)) if limit > 0 else 0.0
-    common = {key: str(labels[key]) for key in ("axis", "source", "load")}
+    common: dict[str, Any] = {key: str(labels[key]) for key in ("axis", "source", "load")}
     common |= {"phase": int(labels["phase"]), "at": float(labels["at"]), "stiffness": float(labels["stiffness"])}
     return data, {**common, "limited": limited, "states": states, "lost": step.lost(), "expected": step.expected()}
 

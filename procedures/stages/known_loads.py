@@ -1,8 +1,8 @@
 """Known loads on the axes of a stage: weights over a pulley along its shaft, and weights on a lever around it.
 
-A weight in air W on a hook pulls along the shaft with W cos(a), a how far the cord is off the shaft's direction; the pulley rubs
-with f W against the motion, so that at rest it holds the shaft as friction does. On a lever of length r it turns the shaft with
-W r. Far and counter-clockwise are positive. The hanger pulls with a mass on it, and by itself not.
+A weight in air W on a hook pulls along the shaft with W cos(a), a how far the cord is off the shaft's direction; the pulley
+rubs with f W against the motion, so that at rest it holds the shaft as friction does. On a lever of length r it turns the shaft
+with W r. Far and counter-clockwise are positive. The hanger pulls with a mass on it, and by itself not.
 """
 
 from __future__ import annotations
