@@ -229,6 +229,42 @@ class GateAsked:
 
 
 @dataclass(frozen=True)
+class LoadedAxis:
+    """An axis that known loads pull at, around (`turns`) or along: a count of its encoder, how far it is moved past and how slowly
+    back, its rate and rise otherwise; `loads` in their order and `changes`, each a source, a label and a sign."""
+
+    name: str
+    turns: bool
+    pitch: float
+    lead: float
+    slow: float
+    rate: float
+    rise: float
+    loads: Sequence[tuple[str, str, int]] = ()
+    changes: Sequence[tuple[str, str, int]] = ()
+
+
+@dataclass(frozen=True)
+class LoadsAsked:
+    """Known loads on `axes` of a stage that has `all_axes`: `settings` as those of steps, and what they are `without` integrators;
+    whether loads are looked at at rest, and put on and taken off; so many set points within a count; times, s: until an axis is
+    taken to rest, over which it is averaged then, that it rests before a load, after a load and over which it is looked at."""
+
+    settings: Numbers
+    without: Numbers
+    axes: Sequence[LoadedAxis]
+    all_axes: Sequence[LoadedAxis]
+    static: bool
+    disturbed: bool
+    phases: int
+    settle_s: float
+    average_s: float
+    rest_s: float
+    after_s: float
+    look_s: float
+
+
+@dataclass(frozen=True)
 class Motions:
     """The truths of motion of one machine; None: it has none of that kind. Each takes the rig and what was drawn for it (a
     `Truth`) first.
@@ -254,6 +290,7 @@ class Motions:
         pulls: of where a channel along and one around read, what holds a shaft that magnets pull, by quantity and where.
         cogging: harmonics of it along and around, by quantity and where, of a shaft turned at rad/s at a place, m.
         runout: what turns with the shaft, vectors by quantity, plane and place along, m.
+        loads: compliance, friction, scale of the force and answers to loads, by quantity and where.
         speeds: at the torque limit, by sharing: `speed` rad/s, `bound` A of the torque current, `ripple` rad/s.
     """
 
@@ -279,6 +316,7 @@ class Motions:
     ) = None
     pulls: Callable[[RigFile, Any, float, float], Mapping[tuple[str, str], float]] | None = None
     cogging: Callable[[RigFile, Any, float, float], Mapping[tuple[str, str], float]] | None = None
+    loads: Callable[[RigFile, Any, LoadsAsked], Mapping[tuple[str, str], float]] | None = None
     runout: Callable[[RigFile, Any, Sequence[float]], Mapping[tuple[str, str, float], complex]] | None = None
 
 

@@ -110,7 +110,8 @@ def _stuck(s: Static) -> Iterator[Finding]:
     if s.moved.min() < MOVED:
         at = int(np.argmin(s.moved))
         text = (f"moved past and back, the axis went {s.moved[at]:.0%} of the way ({MOVED:.0%} expected at least): friction "
-                "or a brake holds it. Neither compliance nor friction is stated. Move further past: lead_m, lead_rad.")  # fmt: skip
+                "or a brake holds it. Neither compliance nor friction is stated. Move further past: lead_m, "
+                "lead_rad.")  # fmt: skip
         yield Finding(
             "load-stuck", text, f"{s.axis.name}, {s.loads[at].name}", Effect.INDETERMINATE, _static(s.axis.name, turns)
         )

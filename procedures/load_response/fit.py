@@ -99,8 +99,8 @@ def pairwise(force: Array, of: Array, masses: Array) -> list[float]:
 
 @dataclass(frozen=True)
 class Answers:
-    """To one kind of change, over set points (K,): greatest deviation in the load's direction, error at the end, and the greatest
-    deviation `against` that direction."""
+    """To one kind of change, over set points (K,): greatest deviation in the load's direction, what is left at the end, and the
+    greatest deviation `against` that direction."""
 
     peak: Array
     left: Array
@@ -108,8 +108,8 @@ class Answers:
 
 
 def answer(times: Array, deviation: Array, after_s: float, look_s: float) -> tuple[float, float, float]:
-    """Greatest deviation within `after_s` after the change, its mean over `look_s` from then on, and the greatest against the load;
-    `deviation` is positive in the direction in which the load drives the axis."""
+    """Greatest deviation within `after_s` after the change, its mean over `look_s` from then on, and the greatest against the
+    load; `deviation` is positive in the direction in which the load drives the axis."""
     within = (times >= 0) & (times <= after_s)
     late = (times >= after_s) & (times <= after_s + look_s)
     if not late.any():

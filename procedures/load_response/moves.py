@@ -93,7 +93,7 @@ def disturbances(rig: Rig, plan: Plan, record: Recorder, axis: StageAxis) -> Non
         for load in changes(rig.file, axis, plan):
             motion(rig).move({axis.name: at + side * lead(axis, plan)})
             motion(rig).move({axis.name: at})
-            rig.clock.sleep(plan.after_s)
+            rig.clock.sleep(plan.rest_s)
             for on in (1, 0):
                 with record.step(DISTURBED, **_labels(rig, axis, load, phase, at), on=on):
                     rig.clock.sleep(plan.before_s)

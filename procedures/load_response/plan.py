@@ -22,6 +22,7 @@ class Plan(BenchPlan):
     slow_rad_s: float = Field(0.015, gt=0)
     settle_s: float = Field(0.4, gt=0)
     average_s: float = Field(0.3, ge=0.1)
+    rest_s: float = Field(3.0, ge=0.5)  # with integrators, before a disturbance
     before_s: float = Field(0.2, ge=0.05)  # of a disturbance
     after_s: float = Field(5.0, ge=1)  # after a load: the error then, and the peak until then
     look_s: float = Field(0.2, ge=0.05)  # over which that error is averaged
