@@ -230,8 +230,8 @@ class GateAsked:
 
 @dataclass(frozen=True)
 class LoadedAxis:
-    """An axis that known loads pull at, around (`turns`) or along: a count of its encoder, how far it is moved past and how slowly
-    back, its rate and rise otherwise; `loads` in their order and `changes`, each a source, a label and a sign."""
+    """An axis that known loads pull at, around (`turns`) or along: a count of its encoder, how far it is moved past and how
+    slowly back, its rate and rise otherwise; `loads` in their order and `changes`, each a source, a label and a sign."""
 
     name: str
     turns: bool
@@ -246,9 +246,10 @@ class LoadedAxis:
 
 @dataclass(frozen=True)
 class LoadsAsked:
-    """Known loads on `axes` of a stage that has `all_axes`: `settings` as those of steps, and what they are `without` integrators;
-    whether loads are looked at at rest, and put on and taken off; so many set points within a count; times, s: until an axis is
-    taken to rest, over which it is averaged then, that it rests before a load, after a load and over which it is looked at."""
+    """Known loads on `axes` of a stage that has `all_axes`: `settings` as those of steps, and what they are `without`
+    integrators; whether loads are looked at at rest, and put on and taken off; so many set points within a count; times, s:
+    until an axis is taken to rest, over which it is averaged then, that it rests before a load, after a load and over which
+    it is looked at."""
 
     settings: Numbers
     without: Numbers

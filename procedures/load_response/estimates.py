@@ -107,7 +107,10 @@ def static(axis: StageAxis, rests: Sequence[Rest], rig: RigFile, plan: Plan) -> 
     p = {name: e.value for name, e in inputs(axis, rig, plan).items()}
     forces, rubs = _forces(loads, p), np.array([_rubs(load, p) for load in loads])
     used = beyond_friction(forces, pairs)
-    line, given = fit.slope(forces[used], pairs.mean[used]), fit.slope(forces[used], pairs.given[used])
+    lined = (
+        used if used[forces != 0].any() else np.ones_like(used)
+    )  # a line of loads that all stick is drawn, and no more
+    line, given = fit.slope(forces[lined], pairs.mean[lined]), fit.slope(forces[lined], pairs.given[lined])
     moved = np.minimum(up[..., 2], down[..., 2]).min(axis=1) / lead(axis, plan)
     mass = np.array([-1 if not q.label else masses(axis, plan).index(q.label) for q in loads])
     growth = _growth(np.abs(forces), pairs.half / line.value, rubs)
@@ -161,7 +164,7 @@ def _of_static(s: Static, rig: RigFile, plan: Plan) -> Found:
 
     known = propagate(model, inputs(s.axis, rig, plan))
     by_points = Estimate.of(1.0, Influence(f"scatter/{s.axis.name}/slope", "scatter of the set points", s.deviation.u
-                                           / s.deviation.value, "1", "A", "normal", s.deviation.dof))  # fmt: skip
+                                           / abs(s.deviation.value), "1", "A", "normal", s.deviation.dof))  # fmt: skip
     encoder = _encoder(s, rig)
     compliance = known[COMPLIANCE] * by_points * encoder
     band = _band(s) * encoder
@@ -189,14 +192,14 @@ def _in(e: Estimate, unit: str) -> Estimate:
 
 
 def _band(s: Static) -> Estimate:
-    """Half of the difference, and half a count that a slow axis stops short of it; each load by itself scatters."""
+    """Half of the difference, and half a count that a slow axis stops short of it."""
     rows = s.pairs.half.mean(axis=1)
     half = count(s.axis) / 2
-    u = float(rows.std(ddof=1)) / math.sqrt(len(rows))
     name, unit = s.axis.name, s.axis.unit
-    points = s.pairs.half.shape[1]
-    out = Estimate.of(float(rows.mean()) + half, Influence(f"scatter/{name}/band", "scatter of the loads", u, unit, "A",
-                                                           "normal", len(rows) - 1))  # fmt: skip
+    single, dof = fit.scatter(s.pairs.half)
+    points, u = s.pairs.half.shape[1], single / math.sqrt(s.pairs.half.size)
+    by_points = Influence(f"scatter/{name}/band", "scatter of the set points", u, unit, "A", "normal", dof)
+    out = Estimate.of(float(rows.mean()) + half, by_points)
     if half:
         u = half / points / math.sqrt(3)
         rounded = Influence(f"rounding/{name}/band", ROUNDED, u, unit, "B", "rectangular")

@@ -15,6 +15,7 @@ from procedures.stages.known_loads import put
 
 APPROACH, DISTURBED = "approach", "disturbed"
 SPARE_S = 0.05
+GOLDEN = 0.6180339887
 
 
 def motion(rig: Rig) -> Motion:
@@ -78,6 +79,11 @@ def _slowly(rig: Rig, axis: StageAxis, rate: float) -> Iterator[None]:
     motion(rig).write({axis.rate: before})
 
 
+def rests(number: int) -> float:
+    """Of a disturbance by its number, between 1 and 1.5, spread evenly however many there are."""
+    return 1 + 0.5 * (number * GOLDEN % 1.0)
+
+
 def _labels(rig: Rig, axis: StageAxis, load: Put, phase: int, at: float) -> dict[str, float | str]:
     source = load.source
     return {
@@ -87,13 +93,17 @@ def _labels(rig: Rig, axis: StageAxis, load: Put, phase: int, at: float) -> dict
 
 
 def disturbances(rig: Rig, plan: Plan, record: Recorder, axis: StageAxis) -> None:
-    """The greatest load each way is put on and taken off, at every set point of one count."""
+    """The greatest load each way is put on and taken off, at every set point of one count. Integrators hunt within friction:
+    rests of different length meet them at different places."""
+    others = [a for a in axes_of(rig.file).values() if a.name != axis.name]
     for phase in range(plan.phases):
         at, side = phase / plan.phases * count(axis), 1 if phase % 2 else -1
+        for other in others:
+            _stand(rig, plan, other, phase)
         for load in changes(rig.file, axis, plan):
             motion(rig).move({axis.name: at + side * lead(axis, plan)})
             motion(rig).move({axis.name: at})
-            rig.clock.sleep(plan.rest_s)
+            rig.clock.sleep(plan.rest_s * rests(phase))
             for on in (1, 0):
                 with record.step(DISTURBED, **_labels(rig, axis, load, phase, at), on=on):
                     rig.clock.sleep(plan.before_s)

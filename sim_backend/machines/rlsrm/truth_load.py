@@ -21,7 +21,8 @@ from sim_backend.machines.rlsrm.params import PlantParams
 from sim_backend.machines.rlsrm.plant import AXES, TRACE, Plant
 from sim_backend.motion import LoadedAxis, LoadsAsked
 
-MORE: Final = 2  # times the plan's set points within a count
+AT_REST, CHANGED = 2, 4  # times the plan's set points within a count, between which they lie
+GOLDEN: Final = 0.6180339887
 FORCES: Final = ("force", "torque")
 SPARE_S: Final = 0.1
 ANSWERS_S: Final = 0.15  # after a load begins to be let go, until a reading shows it
@@ -78,7 +79,7 @@ def _stand(rig: RigFile, drawn: Truth, asked: LoadsAsked, settings: Mapping[str,
 
 
 def _static(s: Stand, drawn: Truth, asked: LoadsAsked, axis: LoadedAxis) -> dict[tuple[str, str], float]:
-    points = MORE * asked.phases
+    points = AT_REST * asked.phases
     found, before = [], ""
     for source, label, sign in axis.loads:
         if before and before != source:
@@ -87,11 +88,8 @@ def _static(s: Stand, drawn: Truth, asked: LoadsAsked, axis: LoadedAxis) -> dict
             s.hang(source, label, axis.turns)
         before = source
         for point in range(points):
-            for other in (a for a in asked.all_axes if a.name != axis.name):
-                at = point / points * other.pitch
-                s.go(asked, other, at + (1 if point % 2 else -1) * other.lead / 2)
-                s.go(asked, other, at)
-            ends = [_approached(s, asked, axis, point / points * axis.pitch, side) for side in (1, -1)]
+            _others(s, asked, axis, point, points)
+            ends = [_approached(s, asked, axis, (point + 0.5) / points * axis.pitch, side) for side in (1, -1)]
             found.append((_newtons(drawn, axis, source, label, sign), *np.ravel(ends)))
     table = np.array(found)
     # up and down: true deviation, given, force
@@ -103,6 +101,13 @@ def _static(s: Stand, drawn: Truth, asked: LoadsAsked, axis: LoadedAxis) -> dict
     names = _names(axis)
     return {(names[0], axis.name): slope[0], (names[1], axis.name): held * slope[0],
             (names[2], axis.name): held - float(rubs), ("force_scale", axis.name): -1 / slope[1]}  # fmt: skip
+
+
+def _others(s: Stand, asked: LoadsAsked, axis: LoadedAxis, point: int, points: int) -> None:
+    for other in (a for a in asked.all_axes if a.name != axis.name):
+        at = (point + 0.5) / points * other.pitch
+        s.go(asked, other, at + (1 if point % 2 else -1) * other.lead / 2)
+        s.go(asked, other, at)
 
 
 def _names(axis: LoadedAxis) -> tuple[str, str, str]:
@@ -140,14 +145,15 @@ def _rubs(drawn: Truth, axis: LoadedAxis, source: str, label: str) -> float:
 
 def _disturbed(s: Stand, asked: LoadsAsked, axis: LoadedAxis) -> dict[tuple[str, str], float]:
     peak, left = ("peak_angle", "error_after_angle") if axis.turns else ("peak", "error_after")
-    points, out = MORE * asked.phases, {}
+    points, out = CHANGED * asked.phases, {}
     found: dict[str, list[tuple[float, float]]] = {}
     for point in range(points):
-        at = point / points * axis.pitch
+        at = (point + 0.5) / points * axis.pitch
+        _others(s, asked, axis, point, points)
         for source, label, sign in axis.changes:
             s.go(asked, axis, at + (1 if point % 2 else -1) * axis.lead)
             s.go(asked, axis, at)
-            s.core.run(asked.rest_s, every=0)
+            s.core.run(asked.rest_s * (1 + 0.5 * (point * GOLDEN % 1.0)), every=0)
             for on in (1, -1):
                 s.hang(source, label if on > 0 else "", axis.turns)
                 s.core.run(ANSWERS_S, every=0)
