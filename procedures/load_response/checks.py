@@ -146,7 +146,7 @@ def _contradictions(s: Static, rests: Sequence[Rest], plan: Plan) -> Iterator[Fi
         if apart > plan.max_apart + SURE * noise:
             text = (f"compliances by each mass alone differ by {apart:.1%}, {plan.max_apart:.0%} allowed: a mass is not what "
                     "its label says, or the force bends over the load.")  # fmt: skip
-            yield Finding("masses-disagree", text, name, Effect.INDETERMINATE, _static(name, turns))
+            yield Finding("load-masses-differ", text, name, Effect.INDETERMINATE, _static(name, turns))
     yield from _unlike_ways(s, plan)
     kp = float(np.mean([r.stiffness for r in rests]))
     spring = -s.given.value / (kp * s.deviation.value)

@@ -181,7 +181,7 @@ def test_an_axis_that_does_not_move() -> None:
 @pytest.mark.parametrize(
     ("planted", "code"),
     [
-        ({"error": {"M3": 0.1}}, "masses-disagree"),
+        ({"error": {"M3": 0.1}}, "load-masses-differ"),
         ({"integrator": 0.5}, "no-spring"),
         ({"rubs": 0.1}, "pulley-rubs"),
         ({"constant": 0.3}, "constant-force"),
@@ -308,7 +308,7 @@ def test_the_whole_path(tmp_path: Path, name: str) -> None:
         ({"hook_exchanged": 1}, "x", "load-on-wrong-side"),
         ({"lever_exchanged": 1}, "angle", "load-on-wrong-side"),
         ({"brake_x": 10}, "x", "load-stuck"),
-        ({"mass_error_M3": 0.15}, "x", "masses-disagree"),
+        ({"mass_error_M3": 0.15}, "x", "load-masses-differ"),
     ],
 )
 def test_planted(tmp_path: Path, truth: dict[str, float], name: str, code: str) -> None:
