@@ -248,8 +248,8 @@ class LoadedAxis:
 class LoadsAsked:
     """Known loads on `axes` of a stage that has `all_axes`: `settings` as those of steps, and what they are `without`
     integrators; whether loads are looked at at rest, and put on and taken off; so many set points within a count; times, s:
-    until an axis is taken to rest, over which it is averaged then, that it rests before a load, after a load and over which
-    it is looked at."""
+    without load after all of them, until an axis is taken to rest, over which it is averaged then, that it rests before a
+    load, after a load and over which it is looked at."""
 
     settings: Numbers
     without: Numbers
@@ -258,6 +258,7 @@ class LoadsAsked:
     static: bool
     disturbed: bool
     phases: int
+    cool_s: float
     settle_s: float
     average_s: float
     rest_s: float

@@ -102,7 +102,7 @@ def static(axis: StageAxis, rests: Sequence[Rest], rig: RigFile, plan: Plan) -> 
         raise AnalysisError(f"axis {axis.name}: found {len(rests)} approaches; expected {2 * plan.phases * len(loads)} (was "
                             "the run stopped early?)")  # fmt: skip
     table = np.array([(r.deviation, r.given, r.side * r.moved) for r in rests])
-    up, down = np.moveaxis(table.reshape(len(loads), plan.phases, 2, 3), 2, 0)
+    up, down = table.reshape(plan.phases, len(loads), 2, 3).transpose(2, 1, 0, 3)
     pairs = Pairs((up + down)[..., 0] / 2, (down - up)[..., 0] / 2, (up + down)[..., 1] / 2)
     p = {name: e.value for name, e in inputs(axis, rig, plan).items()}
     forces, rubs = _forces(loads, p), np.array([_rubs(load, p) for load in loads])
@@ -193,18 +193,12 @@ def _in(e: Estimate, unit: str) -> Estimate:
 
 def _band(s: Static) -> Estimate:
     """Half of the difference, and half a count that a slow axis stops short of it."""
-    rows = s.pairs.half.mean(axis=1)
-    half = count(s.axis) / 2
     name, unit = s.axis.name, s.axis.unit
-    single, dof = fit.scatter(s.pairs.half)
-    points, u = s.pairs.half.shape[1], single / math.sqrt(s.pairs.half.size)
-    by_points = Influence(f"scatter/{name}/band", "scatter of the set points", u, unit, "A", "normal", dof)
-    out = Estimate.of(float(rows.mean()) + half, by_points)
-    if half:
-        u = half / points / math.sqrt(3)
-        rounded = Influence(f"rounding/{name}/band", ROUNDED, u, unit, "B", "rectangular")
-        out = out + Estimate.of(0.0, rounded)
-    return out
+    u, dof = fit.uneven(s.pairs.half)
+    by_points = Influence(
+        f"scatter/{name}/band", "scatter of the set points", u / math.sqrt(dof), unit, "A", "normal", dof
+    )
+    return Estimate.of(float(s.pairs.half.mean()) + count(s.axis) / 2, by_points)
 
 
 def _bent(s: Static) -> Estimate:

@@ -60,6 +60,14 @@ def line(force: Array, of: Array) -> tuple[float, float]:
     return slope, float(means.mean() - slope * force.mean())
 
 
+def uneven(of: Array) -> tuple[float, int]:
+    """Standard uncertainty of the mean of a row, all rows together, by what every other point is off the rest; degrees of
+    freedom. Points are spread evenly over a count, so that what goes with the place in it slowly is in no mean; of points that
+    scatter by themselves it is their standard deviation over the root of their number."""
+    signs = np.where(np.arange(of.shape[1]) % 2, -1.0, 1.0)
+    return math.sqrt(float(np.mean((of @ signs / of.shape[1]) ** 2))), len(of)
+
+
 def scatter(of: Array) -> tuple[float, int]:
     """Standard deviation of single values about the mean of their row, all rows together; degrees of freedom."""
     dof = of.shape[0] * (of.shape[1] - 1)
@@ -69,10 +77,9 @@ def scatter(of: Array) -> tuple[float, int]:
 def slope(force: Array, of: Array) -> Slope:
     """The line, with its scatter."""
     value, zero = line(force, of)
-    s, dof = scatter(of)
+    per, dof = uneven(of)
     away = force - force.mean()
-    square, count = float(away @ away), of.shape[1]
-    per = s / math.sqrt(count)
+    square = float(away @ away)
     u_zero = per * math.sqrt(1 / len(force) + force.mean() ** 2 / square)
     return Slope(value, zero, per / math.sqrt(square), u_zero, dof)
 

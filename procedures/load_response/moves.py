@@ -10,7 +10,7 @@ from bench.procedure.roles import Motion
 from bench.recording.recorder import Recorder
 from bench.rigfile.stage import StageAxis, axes_of
 from procedures.load_response.plan import Plan
-from procedures.load_response.sequence import INTEGRATORS, Put, changes, count, lead, order, slow
+from procedures.load_response.sequence import INTEGRATORS, Put, changes, lead, order, set_point, slow
 from procedures.stages.known_loads import put
 
 APPROACH, DISTURBED = "approach", "disturbed"
@@ -32,18 +32,20 @@ def integrators(rig: Rig, way: str) -> None:
 
 
 def approaches(rig: Rig, plan: Plan, record: Recorder, axis: StageAxis) -> None:
-    """Every load, every set point of one count, from both sides. The other axes come anew to where they stand each time, from
-    the one side and the other in turn: their counts and their friction are then in the scatter."""
+    """At every set point of one count every load, from both sides: so that no winding carries for long. The other axes come
+    anew to where they stand each time, half of the times from one side and half from the other: their counts and their friction
+    are then in the scatter."""
     others = [a for a in axes_of(rig.file).values() if a.name != axis.name]
     on = Put(None, "")
-    for load in order(rig.file, axis, plan):
-        _change(rig, on, load)
-        on = load
-        for phase in range(plan.phases):
+    for phase in range(plan.phases):
+        for load in order(rig.file, axis, plan):
+            _change(rig, on, load)
+            on = load
             for other in others:
                 _stand(rig, plan, other, phase)
             for side in (1, -1):
                 _approach(rig, plan, record, axis, load, phase, side)
+        rig.clock.sleep(plan.cool_s)
     motion(rig).move({axis.name: 0.0})
 
 
@@ -55,7 +57,7 @@ def _change(rig: Rig, before: Put, after: Put) -> None:
 
 
 def _stand(rig: Rig, plan: Plan, axis: StageAxis, phase: int) -> None:
-    at, side = phase / plan.phases * count(axis), 1 if phase % 2 else -1
+    at, side = set_point(axis, plan, phase), 1 if 2 * phase < plan.phases else -1
     motion(rig).move({axis.name: at + side * lead(axis, plan) / 2})
     motion(rig).move({axis.name: at})
     rig.clock.sleep(plan.settle_s)
@@ -63,7 +65,7 @@ def _stand(rig: Rig, plan: Plan, axis: StageAxis, phase: int) -> None:
 
 def _approach(rig: Rig, plan: Plan, record: Recorder, axis: StageAxis, load: Put, phase: int, side: int) -> None:
     """Past by the lead, and slowly back: friction holds the axis where it comes to rest."""
-    at = phase / plan.phases * count(axis)
+    at = set_point(axis, plan, phase)
     motion(rig).move({axis.name: at - side * lead(axis, plan)})
     rig.clock.sleep(plan.settle_s)
     with _slowly(rig, axis, slow(axis, plan)), record.step(APPROACH, **_labels(rig, axis, load, phase, at), side=side):
@@ -97,7 +99,7 @@ def disturbances(rig: Rig, plan: Plan, record: Recorder, axis: StageAxis) -> Non
     rests of different length meet them at different places."""
     others = [a for a in axes_of(rig.file).values() if a.name != axis.name]
     for phase in range(plan.phases):
-        at, side = phase / plan.phases * count(axis), 1 if phase % 2 else -1
+        at, side = set_point(axis, plan, phase), 1 if phase % 2 else -1
         for other in others:
             _stand(rig, plan, other, phase)
         for load in changes(rig.file, axis, plan):

@@ -15,11 +15,12 @@ class Plan(BenchPlan):
     lever_masses: tuple[str, ...] = Field(("M2", "M3"), min_length=1)  # on a lever, ascending
     static: bool = True  # without integrators: each load, approached from both sides
     disturbed: bool = True  # with integrators: the greatest load, put on and taken off
-    phases: int = Field(4, ge=3)  # set points, spread over one count of the encoder
+    phases: int = Field(4, ge=4, multiple_of=2)  # set points, spread over one count of the encoder
     lead_m: float = Field(1.2e-3, gt=0)  # how far the axis is moved past, before it is moved back
     lead_rad: float = Field(0.045, gt=0)
-    slow_m_s: float = Field(4e-4, gt=0)  # of moving back
-    slow_rad_s: float = Field(0.015, gt=0)
+    slow_m_s: float = Field(6e-4, gt=0)  # of moving back
+    slow_rad_s: float = Field(0.02, gt=0)
+    cool_s: float = Field(15.0, ge=0)  # without load after all of them, since windings warm while they carry
     settle_s: float = Field(0.4, gt=0)
     average_s: float = Field(0.3, ge=0.1)
     rest_s: float = Field(3.0, ge=0.5)  # with integrators, before a disturbance

@@ -36,9 +36,9 @@ def masses(axis: StageAxis, plan: Plan) -> tuple[str, ...]:
 
 
 def order(rig: RigFile, axis: StageAxis, plan: Plan) -> tuple[Put, ...]:
-    """Of an axis: nothing, the masses one way, the other way, nothing."""
+    """Of an axis: nothing, each mass one way and the other, nothing. What carries one way cools while the other carries."""
     none = Put(None, "")
-    return (none, *(Put(s, label) for s in sources(rig, axis) for label in masses(axis, plan)), none)
+    return (none, *(Put(s, label) for label in masses(axis, plan) for s in sources(rig, axis)), none)
 
 
 def changes(rig: RigFile, axis: StageAxis, plan: Plan) -> tuple[Put, ...]:
@@ -59,6 +59,11 @@ def slow(axis: StageAxis, plan: Plan) -> float:
 def count(axis: StageAxis) -> float:
     """m or rad of a count; 0 where the rig file does not tell it."""
     return 0.0 if axis.pitch is None else axis.pitch.value
+
+
+def set_point(axis: StageAxis, plan: Plan, phase: int) -> float:
+    """Within one count about zero, m or rad: never where a count has its middle, at which an integrator would rest."""
+    return (phase + 0.5) / plan.phases * count(axis)
 
 
 def step_count(rig: RigFile, plan: Plan) -> int:

@@ -24,10 +24,10 @@ def answers(done: Simulated) -> Found:
     if of is None:
         return
     ways = rig.capabilities.settings[INTEGRATORS]
+    times = (plan.cool_s, plan.settle_s, plan.average_s, plan.rest_s, plan.after_s, plan.look_s)
     asked = LoadsAsked(
         settings_of(done, ways["on"]), settings_of(done, ways["off"]), [_axis(rig, plan, a) for a in chosen(rig, plan)],
-        [_axis(rig, plan, a) for a in axes_of(rig).values()], plan.static, plan.disturbed, plan.phases, plan.settle_s,
-        plan.average_s, plan.rest_s, plan.after_s, plan.look_s,
+        [_axis(rig, plan, a) for a in axes_of(rig).values()], plan.static, plan.disturbed, plan.phases, *times,
     )  # fmt: skip
     for (name, where), value in of(rig, done.drawn, asked).items():
         yield name, where, value

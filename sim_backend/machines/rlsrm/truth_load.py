@@ -81,16 +81,17 @@ def _stand(rig: RigFile, drawn: Truth, asked: LoadsAsked, settings: Mapping[str,
 def _static(s: Stand, drawn: Truth, asked: LoadsAsked, axis: LoadedAxis) -> dict[tuple[str, str], float]:
     points = AT_REST * asked.phases
     found, before = [], ""
-    for source, label, sign in axis.loads:
-        if before and before != source:
-            s.hang(before, "", axis.turns)
-        if source:
-            s.hang(source, label, axis.turns)
-        before = source
-        for point in range(points):
+    for point in range(points):
+        for source, label, sign in axis.loads:
+            if before and before != source:
+                s.hang(before, "", axis.turns)
+            if source:
+                s.hang(source, label, axis.turns)
+            before = source
             _others(s, asked, axis, point, points)
             ends = [_approached(s, asked, axis, (point + 0.5) / points * axis.pitch, side) for side in (1, -1)]
             found.append((_newtons(drawn, axis, source, label, sign), *np.ravel(ends)))
+        s.core.run(asked.cool_s, every=0)
     table = np.array(found)
     # up and down: true deviation, given, force
     force, up, down = table[:, 0], table[:, 1:4], table[:, 4:7]
@@ -106,7 +107,7 @@ def _static(s: Stand, drawn: Truth, asked: LoadsAsked, axis: LoadedAxis) -> dict
 def _others(s: Stand, asked: LoadsAsked, axis: LoadedAxis, point: int, points: int) -> None:
     for other in (a for a in asked.all_axes if a.name != axis.name):
         at = (point + 0.5) / points * other.pitch
-        s.go(asked, other, at + (1 if point % 2 else -1) * other.lead / 2)
+        s.go(asked, other, at + (1 if 2 * point < points else -1) * other.lead / 2)
         s.go(asked, other, at)
 
 
