@@ -6,29 +6,23 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from bench.cli.motion_truth import truth_of_motion
-from bench.cli.virtual import Simulated, simulated_run
 from bench.errors import AnalysisError
-from bench.findings import Effect, Finding
-from bench.procedure import Measured
+from bench.findings import Effect
 from bench.rigfile import RigFile, load_rig
 from bench.rigfile.stage import StageAxis, axes_of
 from bench.uncertainty import interval
 from procedures.load_response import checks, estimates, fit
-from procedures.load_response.figures import all_figures
 from procedures.load_response.plan import Plan
 from procedures.load_response.procedure import check, left_out, procedure
 from procedures.load_response.sequence import Put, lead, order
 from procedures.load_response.steps import Change, Rest
 from procedures.shared.weight import weight
 from procedures.stages.known_loads import force, load_inputs, rubbing, sources
-from reports.figures import draw as draw_figure
 
 PLAN = Plan()
 KP = {"x": 5400.0, "angle": 1.35}
@@ -273,49 +267,3 @@ def test_what_a_plan_may_ask() -> None:
     assert any("x_target" in text for text in check(rig(), Plan(lead_m=0.02)))
     assert {q.name for q in left_out(Plan(static=False))} >= {"compliance", "friction", "force_scale"}
     assert procedure.lacking(load_rig("lira"))
-
-
-def run(folder: Path, truth: Mapping[str, float] | None = None, seed: int = 1, **plan: Any) -> Simulated:
-    return simulated_run("load-response", "rlsrm", seed, plan, folder / "recording.mcap", truth or {})
-
-
-def told_by(done: Simulated) -> dict[str, Measured]:
-    return {f"{r.quantity.name}@{r.where}": r for r in done.results if isinstance(r, Measured)}
-
-
-def strong(done: Simulated) -> set[str]:
-    return {r.code for r in done.results if isinstance(r, Finding) and r.effect is not Effect.NOTE}
-
-
-@pytest.mark.parametrize("name", ["x", "angle"])
-def test_the_whole_path(tmp_path: Path, name: str) -> None:
-    """Every quantity within twice its U of what the drawn machine truly does; friction a little below the bearing's own."""
-    done = run(tmp_path, axes=(name,))
-    values, truth = told_by(done), truth_of_motion(done)
-    assert strong(done) == set()
-    assert set(values) == set(truth)
-    assert len(values) == 12
-    for key, one in values.items():
-        at = interval(one.estimate)
-        assert abs(one.estimate.value - truth[key]) < (at.high - at.low), key
-    held = "friction@x" if name == "x" else "friction_torque@angle"
-    bearing = done.truth["F_c" if name == "x" else "T_c"]
-    assert 0.9 * bearing < truth[held] < 1.02 * bearing
-    shown = list(procedure.drawn(done.recording))
-    assert [s.key for s in shown] == [f"loads-{name}", f"after-{name}", "static"]
-    for figure in shown[:2]:
-        assert draw_figure(figure).startswith("<svg")  # type: ignore[arg-type]
-    assert all_figures is not None
-
-
-@pytest.mark.parametrize(
-    ("truth", "name", "code"),
-    [
-        ({"hook_exchanged": 1}, "x", "load-on-wrong-side"),
-        ({"lever_exchanged": 1}, "angle", "load-on-wrong-side"),
-        ({"brake_x": 10}, "x", "load-stuck"),
-        ({"mass_error_M3": 0.15}, "x", "load-masses-differ"),
-    ],
-)
-def test_planted(tmp_path: Path, truth: dict[str, float], name: str, code: str) -> None:
-    assert code in strong(run(tmp_path, truth, axes=(name,), disturbed=False))

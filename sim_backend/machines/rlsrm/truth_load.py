@@ -19,7 +19,7 @@ from sim_backend.machines.rlsrm.device import StagePlant, control_of
 from sim_backend.machines.rlsrm.operator import Attendant
 from sim_backend.machines.rlsrm.params import PlantParams
 from sim_backend.machines.rlsrm.plant import AXES, TRACE, Plant
-from sim_backend.motion import LoadedAxis, LoadsAsked
+from sim_backend.motion_loads import LoadedAxis, LoadsAsked
 
 AT_REST, CHANGED = 2, 4  # times the plan's set points within a count, between which they lie
 GOLDEN: Final = 0.6180339887
