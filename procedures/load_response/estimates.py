@@ -28,7 +28,6 @@ COMPLIANCE, BAND, FRICTION, SCALE, PEAK, LEFT = (
     "peak",
     "error_after",
 )
-ROUNDED = "counts, by set points spread over one"
 MOVED = 0.2  # of the lead: an approach that went less far did not leave friction's other side
 
 
@@ -246,18 +245,22 @@ def answers(axis: StageAxis, found: Sequence[Change], rig: RigFile, plan: Plan) 
 
 
 def _of_answers(some: Sequence[Answered], plan: Plan) -> Found:
-    """Means over the set points; they scatter alike under all loads of an axis, on and off."""
+    """Means over the set points, which scatter alike under all loads of an axis, on and off. A loop that acts on counts turns
+    an axis back just beyond the edge of one: it has gone less far than it reads, by none to half a count. What is left at the
+    end lies anywhere in its count."""
     out: Found = {}
     for name, key in ((PEAK, "peak"), (LEFT, "left")):
         rows = np.array([getattr(a.answers, key) for a in some])
         s, dof = fit.scatter(rows)
         for a, row in zip(some, rows, strict=True):
-            u = s / math.sqrt(len(row))
-            unit = a.axis.unit
+            u, unit, quarter = s / math.sqrt(len(row)), a.axis.unit, count(a.axis) / 4
+            less, width = (quarter, quarter) if name == PEAK else (0.0, 2 * quarter / plan.phases)
             points = Influence(f"scatter/{name}/{a.where}", "scatter of the set points", u, unit, "A", "normal", dof)
-            e = Estimate.of(float(row.mean()), points)
-            if width := count(a.axis) / 2 / plan.phases / math.sqrt(3):
-                rounded = Influence(f"rounding/{name}/{a.where}", ROUNDED, width, unit, "B", "rectangular")
+            e = Estimate.of(float(row.mean()) - less, points)
+            if width:
+                rounded = Influence(
+                    f"rounding/{name}/{a.where}", "counts", width / math.sqrt(3), unit, "B", "rectangular"
+                )
                 e = e + Estimate.of(0.0, rounded)
             out[named(name, a.axis.unit == "rad"), a.where] = e
     return out

@@ -98,9 +98,12 @@ def _static(s: Stand, drawn: Truth, asked: LoadsAsked, axis: LoadedAxis) -> dict
     away = force - force.mean()
     slope = [float(away @ (up + down)[:, j] / 2 / (away @ away)) for j in range(2)]
     held = float(np.mean(up[:, 2] - down[:, 2])) / 2 + axis.pitch / 2 / slope[0]
+    apart = (
+        float(np.mean(down[:, 1] - up[:, 1])) / 2 * slope[0] / slope[1]
+    )  # by the forces that the loop asked for: as it reads
     rubs = np.mean([_rubs(drawn, axis, source, label) for source, label, _ in axis.loads])
     names = _names(axis)
-    return {(names[0], axis.name): slope[0], (names[1], axis.name): held * slope[0],
+    return {(names[0], axis.name): slope[0], (names[1], axis.name): apart + axis.pitch / 2,
             (names[2], axis.name): held - float(rubs), ("force_scale", axis.name): -1 / slope[1]}  # fmt: skip
 
 
