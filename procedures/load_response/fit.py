@@ -85,13 +85,12 @@ def slope(force: Array, of: Array) -> Slope:
 
 
 def bends(force: Array, of: Array) -> float:
-    """How far slopes between neighbouring loads differ from that of the line: the root of their mean square, relative, over
-    the root of their number."""
+    """How far slopes between neighbouring loads differ from that of the line: the root of their mean square, relative."""
     value, _ = line(force, of)
     at = np.unique(force)
     means = np.array([of[force == f].mean() for f in at])
     found = np.diff(means) / np.diff(at) / value - 1
-    return float(np.sqrt(np.mean(found**2) / len(found)))
+    return float(np.sqrt(np.mean(found**2)))
 
 
 def pairwise(force: Array, of: Array, masses: Array) -> list[float]:

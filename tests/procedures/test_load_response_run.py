@@ -54,7 +54,7 @@ def test_the_whole_path(tmp_path: Path, name: str) -> None:
     [
         ({"hook_exchanged": 1}, "x", "load-on-wrong-side"),
         ({"lever_exchanged": 1}, "angle", "load-on-wrong-side"),
-        ({"brake_x": 10}, "x", "load-stuck"),
+        ({"brake_x": 3}, "x", "load-stuck"),
         ({"mass_error_M3": 0.15}, "x", "load-masses-differ"),
     ],
 )
