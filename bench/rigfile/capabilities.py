@@ -15,6 +15,7 @@ from bench.rigfile.bit import Bit
 from bench.rigfile.capabilities_of_coils import CoilMap
 from bench.rigfile.capabilities_of_loops import CurrentStep, ForceCurrent, Hold, LoopInjection, Motion
 from bench.rigfile.capabilities_of_power import DcLink
+from bench.rigfile.capabilities_of_reference import ReferenceInstrument
 from bench.rigfile.elements import Name
 from bench.rigfile.part import Part
 from bench.rigfile.toleranced import Toleranced
@@ -157,6 +158,7 @@ class Capabilities(Part):
     force_currents: Mapping[Name, ForceCurrent] = {}
     coil_map: CoilMap | None = None
     dc_link: DcLink | None = None
+    reference: Mapping[Name, ReferenceInstrument] = {}
     model: Mapping[Name, str] = {}
     landing_speed: str = ""
     lift_time: str = ""
