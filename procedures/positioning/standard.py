@@ -21,7 +21,7 @@ FIGURES = ("A", "A_up", "A_down", "R", "R_up", "R_down", "E", "E_up", "E_down", 
 
 @dataclass(frozen=True)
 class ByTarget:
-    """Of each target: `mean` and `s` (..., 2, m), ways up and down; `reversal` B_i and `repeatability` R_i of both ways (..., m)."""
+    """Of each target: `mean` and `s` each way (..., 2, m), up and down; `reversal` B_i, `repeatability` R_i (..., m)."""
 
     mean: Array
     s: Array
@@ -38,7 +38,7 @@ def by_target(x: Array) -> ByTarget:
 
 
 def figures(x: Array) -> Array:
-    """FIGURES of deviations (..., 2, m, n), as (..., 12). No zero is in them but in signs: what all deviations share cancels."""
+    """FIGURES of deviations (..., 2, m, n), as (..., 12). What all deviations share cancels."""
     t = by_target(x)
     high, low = t.mean + 2 * t.s, t.mean - 2 * t.s
     both = t.mean.mean(axis=-2)

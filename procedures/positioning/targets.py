@@ -2,8 +2,8 @@
 
     P_i = low + (i + r_i) p,     p = travel/m,     r_i within the middle of its interval, at random
 
-and P_i/count - floor(P_i/count) takes m values that are spread evenly over a count, in a random order: half of a count that is lost
-or gained shows, and so does what repeats with a pole's or a scale's period.
+and P_i/count - floor(P_i/count) takes m values that are spread evenly over a count, in a random order: half of a count that is
+lost or gained shows, and so does what repeats with a pole's or a scale's period.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ class Approach:
 
 
 def fewest(unit: str, travel: float) -> int:
-    """Targets that ISO 230-2 asks for at least: 5, and 5 a metre, on a linear axis up to 2 m; on a rotary one 3 up to 90 degrees,
-    5 up to 180, 8 beyond."""
+    """Targets that ISO 230-2 asks for at least: 5, and 5 a metre, on a linear axis up to 2 m; on a rotary one 3 up to 90
+    degrees, 5 up to 180, 8 beyond."""
     if unit == "m":
         return max(5, math.ceil(5 * travel - 1e-9))
     return next((n for most, n in ((SQUARE, 3), (2 * SQUARE, 5)) if travel <= most * (1 + 1e-9)), 8)
@@ -62,8 +62,8 @@ def on_counts(at: Sequence[float] | Array, pitch: float) -> int:
 
 
 def cycle(at: Sequence[float] | Array, repeats: int) -> Iterator[Approach]:
-    """The standard test cycle: from the first target to the last one, each from below, and back, each from above; again and again.
-    Before each way the axis goes beyond its first target, which is no approach."""
+    """The standard test cycle: from the first target to the last one, each from below, and back, each from above; again and
+    again. Before each way the axis goes beyond its first target, which is no approach."""
     places = [float(p) for p in at]
     for repeat in range(repeats):
         for way in (UP, DOWN):

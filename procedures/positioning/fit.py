@@ -1,0 +1,118 @@
+"""What an instrument's own errors make of the figures of ISO 230-2, by Monte Carlo, and by the technical report's sums.
+
+The measurand is a figure T of the true deviations x of these very approaches. What is read is y = x + e, and T is neither linear nor
+without bias: noise adds to every s, and the largest of many is the one that noise made larger. So y less draws of e would count it
+twice. Instead draws go on top of deviations x* that have lost what noise gave them, and
+
+    T(x) is taken to lie where T(y) - (T(x* + e) - T(x*)) does.
+
+x* has the scatter within cells, the reversal's spread and the means' spread of y, each shrunk by sqrt(1 - its noise/its variance).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from procedures.positioning.standard import DOWN, UP, figures
+
+Array = npt.NDArray[np.float64]
+DRAWS = 20_000
+BATCH = 2_000
+GAIN, SCALE, READINGS, WANDER = "gain", "error", "readings", "drift"
+GROUPS = (GAIN, SCALE, READINGS, WANDER)
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Of an instrument, standard uncertainties: `gain` as a share, and whether it is rectangular; `scale` at any one place, `noise`
+    of one reading, `wander` of its zero a second; `step`, its resolution."""
+
+    gain: float = 0.0
+    flat: bool = False
+    scale: float = 0.0
+    noise: float = 0.0
+    wander: float = 0.0
+    step: float = 0.0
+
+    @property
+    def reading(self) -> float:
+        """Standard uncertainty of a reading by its noise and rounding."""
+        return math.hypot(self.noise, self.step / math.sqrt(12))
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Of the twelve figures: what errors add to each, draws (DRAWS, 12); by group what it alone does, standard deviations (12,);
+    slopes over the gain (12,)."""
+
+    added: Array
+    alone: Mapping[str, Array]
+    slope: Array
+
+
+def shrunk(y: Array, errors: Errors) -> Array:
+    """Deviations (2, m, n) without what noise gave their spreads."""
+    n = y.shape[-1]
+    mean = y.mean(axis=-1)
+    both, reversal = mean.mean(axis=0), mean[UP] - mean[DOWN]
+    noise = errors.reading**2
+    within = _left(float(y.var(axis=-1, ddof=1).mean()), noise)
+    apart = _left(float(reversal.var(ddof=1)), 2 * noise / n)
+    along = _left(float(both.var(ddof=1)), errors.scale**2 + noise / (2 * n))
+    middle = both.mean() + along * (both - both.mean())
+    half = (reversal.mean() + apart * (reversal - reversal.mean())) / 2
+    means = np.stack([middle + half, middle - half])
+    return np.asarray(means[..., None] + within * (y - mean[..., None]))
+
+
+def _left(variance: float, noise: float) -> float:
+    return math.sqrt(max(0.0, 1 - noise / variance)) if variance > 0 else 0.0
+
+
+def spread(y: Array, places: Array, times: Array, errors: Errors, seed: int = 0) -> Spread:
+    """Of deviations y (2, m, n) at `places` (m,) m or rad, read at `times` (2, m, n) s."""
+    from_ = shrunk(y, errors)
+    still = figures(from_)
+    rng = np.random.default_rng([seed, 230])
+    parts: dict[str, list[Array]] = {group: [] for group in (*GROUPS, "")}
+    for _ in range(DRAWS // BATCH):
+        drawn = _drawn(errors, places, times, rng)
+        for group in GROUPS:
+            parts[group].append(figures(from_ + drawn[group]) - still)
+        parts[""].append(figures(from_ + sum(drawn.values())) - still)
+    gain = places[None, :, None]
+    little = max(errors.gain, 1e-9)
+    slope = (figures(from_ + little * gain) - figures(from_ - little * gain)) / (2 * little)
+    whole = {group: np.concatenate(some) for group, some in parts.items()}
+    return Spread(whole.pop(""), {group: some.std(axis=0) for group, some in whole.items()}, slope)
+
+
+def _drawn(errors: Errors, places: Array, times: Array, rng: np.random.Generator) -> dict[str, Array]:
+    """Errors of readings by group, each (BATCH, 2, m, n) or what broadcasts to it."""
+    shape = (BATCH, *times.shape)
+    flat, normal = rng.uniform(-math.sqrt(3), math.sqrt(3), (2, BATCH, 1, 1, 1)), rng.standard_normal((BATCH, 1, 1, 1))
+    gain = errors.gain * (flat[0] if errors.flat else normal)
+    readings = errors.noise * rng.standard_normal(shape) + errors.step * (rng.random(shape) - 0.5)
+    return {
+        GAIN: gain * places[None, None, :, None],
+        SCALE: errors.scale * rng.standard_normal((BATCH, 1, len(places), 1)),
+        READINGS: readings,
+        WANDER: errors.wander * flat[1] * (times - times.mean()),
+    }
+
+
+def by_report(errors: Errors, travel: float, seconds: float, n: int) -> dict[str, float]:
+    """U with k = 2 as ISO/TR 230-9 sums it: in squares, without bias. `device`, the instrument along the travel; `eve`, the
+    environment: noise and wandering. A mean has eve/sqrt(n); R, 4 s, is given 2 eve."""
+    device = 2 * math.hypot(errors.gain * travel, math.sqrt(2) * errors.scale)
+    eve = 2 * math.hypot(errors.reading, errors.wander * seconds / 2)
+    one, both, repeat = 2 * eve**2 / n, eve**2 / n, 2 * eve
+    out = {name: math.hypot(device, math.sqrt(one)) for name in ("E", "E_up", "E_down")}
+    out |= {name: repeat for name in ("R", "R_up", "R_down")}
+    out |= {name: math.hypot(device, math.sqrt(one), repeat) for name in ("A", "A_up", "A_down")}
+    return out | {"M": math.hypot(device, math.sqrt(both)), "B": math.sqrt(one), "B_mean": math.sqrt(one)}
