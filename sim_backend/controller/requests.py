@@ -47,8 +47,9 @@ class Requests:
         self._binding, self._map, self._tick = rig.binding, messages, tick
         self._owner, self._parameters, self._states, self._captures = owner, parameters, states, captures
         there = messages.messages
-        replied = {n for n in COMMANDS if "CommandReply" in there and _by_command(rig.binding.command(n), messages)}
-        self._codes = {n: wanted(rig.binding.command(n), messages) for n in COMMANDS if n in replied}
+        known = [n for n in COMMANDS if rig.binding.knows(n, messages)]
+        replied = {n for n in known if "CommandReply" in there and _by_command(rig.binding.command(n), messages)}
+        self._codes = {n: wanted(rig.binding.command(n), messages) for n in known if n in replied}
         self._asked, self._commands = Asked(rig, messages), Recogniser(rig, messages, frozenset(replied))
         self._spinning = False
         handlers: dict[str, Callable[[Values, Tell], None]] = {
