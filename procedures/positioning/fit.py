@@ -1,12 +1,13 @@
 """What an instrument's own errors make of the figures of ISO 230-2, by Monte Carlo, and by the technical report's sums.
 
-The measurand is a figure T of the true deviations x of these very approaches. What is read is y = x + e, and T is neither linear nor
-without bias: noise adds to every s, and the largest of many is the one that noise made larger. So y less draws of e would count it
-twice. Instead draws go on top of deviations x* that have lost what noise gave them, and
+The measurand is a figure T of the true deviations x of these very approaches. What is read is y = x + e, and T is neither
+linear nor without bias: noise adds to every s, and the largest of many is the one that noise made larger. So y less draws of e
+would count it twice. Instead draws go on top of deviations x*, and
 
     T(x) is taken to lie where T(y) - (T(x* + e) - T(x*)) does.
 
-x* has the scatter within cells, the reversal's spread and the means' spread of y, each shrunk by sqrt(1 - its noise/its variance).
+x* is y, and y without what noise gave it: the scatter within cells, the reversal's spread and the means' spread, each shrunk by
+sqrt(1 - its noise/its variance). Of the two answers the interval has both: where noise is small they are one.
 """
 
 from __future__ import annotations
@@ -29,8 +30,8 @@ GROUPS = (GAIN, SCALE, READINGS, WANDER)
 
 @dataclass(frozen=True)
 class Errors:
-    """Of an instrument, standard uncertainties: `gain` as a share, and whether it is rectangular; `scale` at any one place, `noise`
-    of one reading, `wander` of its zero a second; `step`, its resolution."""
+    """Of an instrument, standard uncertainties: `gain` as a share, and whether it is rectangular; `scale` at any one place,
+    `noise` of one reading, `wander` of its zero a second; `step`, its resolution."""
 
     gain: float = 0.0
     flat: bool = False
@@ -47,8 +48,8 @@ class Errors:
 
 @dataclass(frozen=True)
 class Spread:
-    """Of the twelve figures: what errors add to each, draws (DRAWS, 12); by group what it alone does, standard deviations (12,);
-    slopes over the gain (12,)."""
+    """Of the twelve figures: what errors add to each, draws (DRAWS, 12) in order; by group what it alone does, standard
+    deviations (12,); slopes over the gain (12,)."""
 
     added: Array
     alone: Mapping[str, Array]
@@ -76,20 +77,32 @@ def _left(variance: float, noise: float) -> float:
 
 def spread(y: Array, places: Array, times: Array, errors: Errors, seed: int = 0) -> Spread:
     """Of deviations y (2, m, n) at `places` (m,) m or rad, read at `times` (2, m, n) s."""
-    from_ = shrunk(y, errors)
-    still = figures(from_)
+    starts = (shrunk(y, errors), y)
+    still = [figures(x) for x in starts]
     rng = np.random.default_rng([seed, 230])
-    parts: dict[str, list[Array]] = {group: [] for group in (*GROUPS, "")}
+    alone: dict[str, list[Array]] = {group: [] for group in GROUPS}
+    added: list[list[Array]] = [[], []]
     for _ in range(DRAWS // BATCH):
         drawn = _drawn(errors, places, times, rng)
+        whole = sum(drawn.values())
+        for k, x in enumerate(starts):
+            added[k].append(figures(x + whole) - still[k])
         for group in GROUPS:
-            parts[group].append(figures(from_ + drawn[group]) - still)
-        parts[""].append(figures(from_ + sum(drawn.values())) - still)
-    gain = places[None, :, None]
-    little = max(errors.gain, 1e-9)
-    slope = (figures(from_ + little * gain) - figures(from_ - little * gain)) / (2 * little)
-    whole = {group: np.concatenate(some) for group, some in parts.items()}
-    return Spread(whole.pop(""), {group: some.std(axis=0) for group, some in whole.items()}, slope)
+            alone[group].append(figures(starts[0] + drawn[group]) - still[0])
+    little = max(errors.gain, 1e-9) * places[None, :, None]
+    slope = (figures(starts[0] + little) - figures(starts[0] - little)) / (2 * max(errors.gain, 1e-9))
+    return Spread(
+        _both(*(np.concatenate(some) for some in added)),
+        {group: np.concatenate(some).std(axis=0) for group, some in alone.items()},
+        slope,
+    )
+
+
+def _both(one: Array, other: Array) -> Array:
+    """Draws, in order, whose quantiles below the middle are the lower of two, above it the higher."""
+    one, other = np.sort(one, axis=0), np.sort(other, axis=0)
+    low = np.arange(len(one))[:, None] < len(one) // 2
+    return np.where(low, np.minimum(one, other), np.maximum(one, other))
 
 
 def _drawn(errors: Errors, places: Array, times: Array, rng: np.random.Generator) -> dict[str, Array]:
@@ -113,6 +126,6 @@ def by_report(errors: Errors, travel: float, seconds: float, n: int) -> dict[str
     eve = 2 * math.hypot(errors.reading, errors.wander * seconds / 2)
     one, both, repeat = 2 * eve**2 / n, eve**2 / n, 2 * eve
     out = {name: math.hypot(device, math.sqrt(one)) for name in ("E", "E_up", "E_down")}
-    out |= {name: repeat for name in ("R", "R_up", "R_down")}
+    out |= dict.fromkeys(("R", "R_up", "R_down"), repeat)
     out |= {name: math.hypot(device, math.sqrt(one), repeat) for name in ("A", "A_up", "A_down")}
     return out | {"M": math.hypot(device, math.sqrt(both)), "B": math.sqrt(one), "B_mean": math.sqrt(one)}
