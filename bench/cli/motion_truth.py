@@ -20,6 +20,7 @@ from bench.cli.truths import (
     linear_rotary,
     motor,
     one_axis,
+    positioned,
     pull,
     rotor,
     turning,
@@ -75,4 +76,5 @@ TRUTHS: Mapping[str, Callable[[Any], Found]] = {
     "coil-map": coils.shares,
     "gate-margin": gate.margins,
     "bearing-constant": weights.constants,
+    "positioning": positioned.figures,
 }
