@@ -25,8 +25,9 @@ class Plan(BenchPlan):
     rise_m_s2: float = Field(0.3, gt=0)
     rate_rad_s: float = Field(3.0, gt=0)
     rise_rad_s2: float = Field(20.0, gt=0)
-    dwell_s: float = Field(1.0, ge=0.1)  # from the set point's arrival until it is read
+    dwell_s: float = Field(2.0, ge=0.1)  # from the set point's arrival until it is read
     rest_s: float = Field(0.2, ge=0.05)  # of that, looked at: it has to be at rest
+    tries: int = Field(6, ge=1)  # of a reading, until the axis stands still before it and meanwhile
     window_s: float = Field(0.2, gt=0)  # of readings by a channel, whose mean counts
     rest_counts: float = Field(3.0, gt=0)  # by which an axis at rest may move
     far: float = Field(12.0, gt=0)  # times the scatter of all from which a reading is off

@@ -8,6 +8,9 @@ for its place: that would be the repeatability of a counter.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import count
+
+import numpy as np
 
 from bench.figures import Shown
 from bench.findings import Findings
@@ -55,14 +58,17 @@ NONE = f"capabilities.reference: found no reference instrument of an axis; {COUN
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """One axis after the other, approach after approach, each read at rest."""
-    number = 0
+    numbers = count(1)
     for one in tested(rig.file, plan):
         before: Approach | None = None
         for approach in cycle(one.at, plan.repeats):
             if before is None or before.way != approach.way:
                 _go(rig, one, one.beyond[0 if approach.way == UP else 1])
-            number += 1
-            _read(rig, plan, record, one, approach, number)
+            _go(rig, one, approach.place)
+            rig.clock.sleep(max(plan.dwell_s - plan.rest_s, 0.0))
+            for _ in range(plan.tries):
+                if _read(rig, plan, record, one, approach, next(numbers)):
+                    break
             before = approach
 
 
@@ -71,19 +77,24 @@ def _go(rig: Rig, one: Tested, place: float) -> None:
     rig.motion.move({one.axis.name: place})
 
 
-def _read(rig: Rig, plan: Plan, record: Recorder, one: Tested, approach: Approach, number: int) -> None:
+def _read(rig: Rig, plan: Plan, record: Recorder, one: Tested, approach: Approach, number: int) -> bool:
+    """One reading; whether the axis stood still before it and meanwhile. A loop that integrates against friction jumps now and
+    then; of more readings at one approach the last one counts."""
     labels = {"axis": one.axis.name, "number": number, "place": approach.place,
               "target": approach.target, "way": approach.way, "repeat": approach.repeat}  # fmt: skip
-    _go(rig, one, approach.place)
-    rig.clock.sleep(max(plan.dwell_s - plan.rest_s, 0.0))
-    with record.step(REST, **labels):
-        rig.clock.sleep(plan.rest_s)
-    with record.step(READING, **labels):
-        if one.by.channel:
-            rig.clock.sleep(plan.window_s)
-            return
-        shown = rig.operator.read(one.axis.name, one.by.instrument, one.unit)
-    record.event(READ, number=number, axis=one.axis.name, value=shown)
+    channel, shown = one.axis.channel, None
+    with record.watching((channel,)) as seen:
+        with record.step(REST, **labels):
+            rig.clock.sleep(plan.rest_s)
+        with record.step(READING, **labels):
+            if one.by.channel:
+                rig.clock.sleep(plan.window_s)
+            else:
+                shown = rig.operator.read(one.axis.name, one.by.instrument, one.unit)
+    if shown is not None:
+        record.event(READ, number=number, axis=one.axis.name, value=shown)
+    stood = seen.get(channel)
+    return stood is None or not one.pitch or float(np.ptp(stood)) <= plan.rest_counts * one.pitch
 
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> list[Result]:
@@ -155,7 +166,7 @@ def settings(rig: RigFile, plan: Plan) -> Mapping[str, float]:
 
 
 def steps_on(rig: RigFile, plan: Plan) -> int:
-    """A rest and a reading for each approach."""
+    """A rest and a reading for each approach, where the axis stands still."""
     return sum(4 * len(one.at) * plan.repeats for one in tested(rig, plan))
 
 

@@ -16,17 +16,24 @@ def figures(done: Simulated) -> Found:
     """Of the places where the axes truly were at each reading of this run: how they come to rest hangs on friction and on
     counts, and no other run has the same."""
     from procedures.positioning.standard import FIGURES, figures
-    from procedures.positioning.targets import UP, cycle
+    from procedures.positioning.steps import READ, READING
+    from procedures.positioning.targets import UP
     from procedures.positioning.way import tested
 
-    rig, plan, seen = done.recording.rig, done.recording.plan, done.drawn.seen
-    for one in tested(rig, plan):
-        places = [place for axis, place in seen if axis == one.axis.name]
-        order = list(cycle(one.at, plan.repeats))
-        if len(places) != len(order):
+    recording, plan = done.recording, done.recording.plan
+    told = [e["number"] for e in recording.events(READ)]
+    if len(told) != len(done.drawn.seen):
+        return
+    saw = {number: place for number, (_, place) in zip(told, done.drawn.seen, strict=True)}
+    for one in tested(recording.rig, plan):
+        x = np.full((2, len(one.at), plan.repeats), np.nan)
+        for step in recording.steps(READING):
+            labels = step.labels
+            if labels["axis"] == one.axis.name:  # of more readings at one approach the last one counts
+                x[0 if labels["way"] == UP else 1, labels["target"], labels["repeat"]] = (
+                    saw[labels["number"]] - labels["place"]
+                )
+        if np.isnan(x).any():
             continue
-        x = np.empty((2, len(one.at), plan.repeats))
-        for a, place in zip(order, places, strict=True):
-            x[0 if a.way == UP else 1, a.target, a.repeat] = place - a.place
         end = "_angle" if one.axis.unit == "rad" else ""
         yield from ((f"{name}{end}", one.axis.name, float(v)) for name, v in zip(FIGURES, figures(x), strict=True))
