@@ -85,7 +85,7 @@ def of_axes(taken: Sequence[Taken], recording: Recording[Plan]) -> Iterator[Find
 
 def _rest(t: Taken, plan: Plan) -> Iterator[Finding]:
     one, unit = t.tested, t.tested.axis.unit
-    may = plan.rest_counts * one.pitch
+    may = (plan.rest_counts + 0.5) * one.pitch  # half a count beside what was read again for
     if not may:
         return
     if (count := int((t.moved > may).sum())) > 0:
@@ -125,14 +125,16 @@ def _far(t: Taken, plan: Plan) -> Iterator[Finding]:
 
 
 def trend(t: Taken) -> tuple[float, float]:
-    """Of readings within their cells over time, m/s or rad/s, and its standard uncertainty."""
-    x = t.read - t.tested.at[None, :, None]
-    x, time = (a - a.mean(axis=-1, keepdims=True) for a in (x, t.times))
-    square = float((time**2).sum())
-    slope = float((time * x).sum()) / square
-    left = x - slope * time
-    dof = x.size - x.shape[0] * x.shape[1] - 1
-    return slope, math.sqrt(float((left**2).sum()) / dof / square)
+    """Of readings within their cells over time, m/s or rad/s, beside what goes with the encoder's: how the axis itself comes to
+    rest is no trend of the instrument. And its standard uncertainty."""
+    x, *columns = ((a - a.mean(axis=-1, keepdims=True)).ravel() for a in (t.read, t.times, t.counted))
+    matrix = np.stack([c / np.ptp(c) for c in columns if np.ptp(c) > 0], axis=1)
+    found, _, rank, _ = np.linalg.lstsq(matrix, x, rcond=None)
+    left = x - matrix @ found
+    dof = x.size - t.read.shape[0] * t.read.shape[1] - int(rank)
+    u = math.sqrt(float(left @ left) / dof * float(np.linalg.pinv(matrix.T @ matrix)[0, 0]))
+    whole = float(np.ptp(columns[0]))
+    return float(found[0]) / whole, u / whole
 
 
 def _trend(t: Taken) -> Iterator[Finding]:

@@ -1,13 +1,14 @@
 """What an instrument's own errors make of the figures of ISO 230-2, by Monte Carlo, and by the technical report's sums.
 
 The measurand is a figure T of the true deviations x of these very approaches. What is read is y = x + e, and T is neither
-linear nor without bias: noise adds to every s, and the largest of many is the one that noise made larger. So y less draws of e
-would count it twice. Instead draws go on top of deviations x*, and
+linear nor without bias: noise adds to every s, and the largest of many may be one that noise made so. There is no one answer to
+that, so there are three, and the interval has all of them; where errors are small they are one. T(x) lies where
 
-    T(x) is taken to lie where T(y) - (T(x* + e) - T(x*)) does.
+    T(y - e)                                            (JCGM 101: what noise added stays, and is added once more)
+    T(y) - (T(y + e) - T(y)),  T(y) - (T(x* + e) - T(x*))     (what errors do to deviations like these, taken off)
 
-x* is y, and y without what noise gave it: the scatter within cells, the reversal's spread and the means' spread, each shrunk by
-sqrt(1 - its noise/its variance). Of the two answers the interval has both: where noise is small they are one.
+x* is y without what noise gave it: the scatter within cells, the reversal's spread and the means' spread, each shrunk by
+sqrt(1 - its noise/its variance).
 """
 
 from __future__ import annotations
@@ -77,32 +78,33 @@ def _left(variance: float, noise: float) -> float:
 
 def spread(y: Array, places: Array, times: Array, errors: Errors, seed: int = 0) -> Spread:
     """Of deviations y (2, m, n) at `places` (m,) m or rad, read at `times` (2, m, n) s."""
-    starts = (shrunk(y, errors), y)
+    starts, here = (shrunk(y, errors), y), figures(y)
     still = [figures(x) for x in starts]
     rng = np.random.default_rng([seed, 230])
     alone: dict[str, list[Array]] = {group: [] for group in GROUPS}
-    added: list[list[Array]] = [[], []]
+    added: list[list[Array]] = [[], [], []]
     for _ in range(DRAWS // BATCH):
         drawn = _drawn(errors, places, times, rng)
         whole = sum(drawn.values())
         for k, x in enumerate(starts):
             added[k].append(figures(x + whole) - still[k])
+        added[2].append(here - figures(y - whole))
         for group in GROUPS:
             alone[group].append(figures(starts[0] + drawn[group]) - still[0])
     little = max(errors.gain, 1e-9) * places[None, :, None]
     slope = (figures(starts[0] + little) - figures(starts[0] - little)) / (2 * max(errors.gain, 1e-9))
     return Spread(
-        _both(*(np.concatenate(some) for some in added)),
+        _all(*(np.concatenate(some) for some in added)),
         {group: np.concatenate(some).std(axis=0) for group, some in alone.items()},
         slope,
     )
 
 
-def _both(one: Array, other: Array) -> Array:
-    """Draws, in order, whose quantiles below the middle are the lower of two, above it the higher."""
-    one, other = np.sort(one, axis=0), np.sort(other, axis=0)
-    low = np.arange(len(one))[:, None] < len(one) // 2
-    return np.where(low, np.minimum(one, other), np.maximum(one, other))
+def _all(*answers: Array) -> Array:
+    """Draws, in order, whose quantiles below the middle are the lowest of all answers', above it the highest."""
+    each = np.sort(np.stack(answers), axis=1)
+    low = np.arange(each.shape[1])[:, None] < each.shape[1] // 2
+    return np.asarray(np.where(low, each.min(axis=0), each.max(axis=0)))
 
 
 def _drawn(errors: Errors, places: Array, times: Array, rng: np.random.Generator) -> dict[str, Array]:

@@ -31,6 +31,6 @@ class Plan(BenchPlan):
     window_s: float = Field(0.2, gt=0)  # of readings by a channel, whose mean counts
     rest_counts: float = Field(3.0, gt=0)  # by which an axis at rest may move
     far: float = Field(12.0, gt=0)  # times the scatter of all from which a reading is off
-    max_noise: float = Field(0.4, gt=0)  # of the scatter that is read: noise and rounding of the instrument
+    max_noise: float = Field(0.8, gt=0)  # of the scatter that is read: noise and rounding of the instrument
     max_warming_K: float = Field(1.0, gt=0)  # of what carries the axis, in the run
     max_lost: float = Field(1e-3, ge=0)  # share of a step's samples

@@ -94,7 +94,7 @@ def _read(rig: Rig, plan: Plan, record: Recorder, one: Tested, approach: Approac
     if shown is not None:
         record.event(READ, number=number, axis=one.axis.name, value=shown)
     stood = seen.get(channel)
-    return stood is None or not one.pitch or float(np.ptp(stood)) <= plan.rest_counts * one.pitch
+    return stood is None or not one.pitch or float(np.ptp(stood)) <= (plan.rest_counts + 0.25) * one.pitch
 
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> list[Result]:

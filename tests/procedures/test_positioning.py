@@ -78,7 +78,7 @@ def test_noise_is_taken_out_of_spreads_once() -> None:
 
 
 def test_intervals_hold_the_true_figures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """120 axes, twelve figures of each: four of five hundred beyond what 95 % are. A biased figure, R, is told by its own."""
+    """120 axes, twelve figures of each, within what 95 % are of so many."""
     monkeypatch.setattr(fit, "DRAWS", 4000)
     r, held = np.random.default_rng(5), np.zeros(12)
     for k in range(120):
@@ -137,7 +137,7 @@ def test_the_truth_lies_in_the_intervals(done: Simulated) -> None:
 def test_figures_can_be_drawn(done: Simulated) -> None:
     shown = list(procedure.figures(procedure.evaluated(done.recording).result, done.recording))
     assert [f.key for f in shown][:2] == ["deviations-x", "deviations-angle"]
-    assert all(len(draw_figure(f)) for f in shown if not hasattr(f, "rows"))
+    assert all(draw_figure(f).svg for f in shown if not hasattr(f, "rows"))
     assert list(all_figures([], RLSRM)) == []
 
 

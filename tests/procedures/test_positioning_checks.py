@@ -127,12 +127,15 @@ def test_readings_that_wander() -> None:
     t = taken(sound())
     wander = 3e-7 * (t.times - t.times.mean())
     assert codes(replace(t, read=t.read + wander)) == {"readings-trend"}
+    own = t.read + wander  # the axis itself, as its encoder has it, to a count
+    assert codes(replace(t, read=own, counted=np.round(own / UM) * UM, before=own)) == set()
+    assert codes(replace(t, read=own, counted=np.zeros_like(own), before=np.zeros_like(own))) >= {"readings-trend"}
     allowed = ALONG.by.drift.half_width if ALONG.by.drift else 0.0  # type: ignore[union-attr]
     assert codes(replace(t, read=t.read + 0.5 * float(allowed or 0) * t.times)) == set()
 
 
 def test_a_coarse_instrument() -> None:
-    fine = taken(sound(scatter=0.05 * UM))
+    fine = taken(sound(scatter=0.03 * UM))
     assert codes(fine) == {"reference-coarse"}
 
 
