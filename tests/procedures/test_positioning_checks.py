@@ -102,6 +102,9 @@ def test_another_sign_unit_or_axis() -> None:
         found = list(checks.of_signals([replace(t, read=factor * t.read)], RLSRM, PLAN))
         assert [f.code for f in found] == ["reference-disagrees"]
         assert word in found[0].text
+    assert [f.code for f in checks.of_signals([replace(t, counted=0 * t.counted)], RLSRM, PLAN)] == [
+        "reference-disagrees"
+    ]
     assert "?" not in next(checks.of_signals([replace(t, read=1.7 * t.read)], RLSRM, PLAN)).text
 
 
@@ -129,7 +132,8 @@ def test_readings_that_wander() -> None:
     assert codes(replace(t, read=t.read + wander)) == {"readings-trend"}
     own = t.read + wander  # the axis itself, as its encoder has it, to a count
     assert codes(replace(t, read=own, counted=np.round(own / UM) * UM, before=own)) == set()
-    assert codes(replace(t, read=own, counted=np.zeros_like(own), before=np.zeros_like(own))) >= {"readings-trend"}
+    coarse = np.broadcast_to(ALONG.at[None, :, None], own.shape)  # an encoder that sees nothing of it
+    assert codes(replace(t, read=own, counted=coarse, before=coarse)) == {"readings-trend"}
     allowed = ALONG.by.drift.half_width if ALONG.by.drift else 0.0  # type: ignore[union-attr]
     assert codes(replace(t, read=t.read + 0.5 * float(allowed or 0) * t.times)) == set()
 
