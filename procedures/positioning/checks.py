@@ -61,8 +61,8 @@ def of_signals(taken: Sequence[Taken], rig: RigFile, plan: Plan) -> Iterator[Fin
 
 
 def _disagrees(t: Taken) -> Iterator[Finding]:
-    """What the instrument reads over what the encoder reads has a slope of 1, nearly."""
-    read, counted = (a - a.mean() for a in (t.read, t.counted))
+    """What the instrument reads over what the encoder reads has a slope of 1, nearly; by medians, for one may be mistyped."""
+    read, counted = (np.median(a, axis=-1) - np.median(a, axis=-1).mean() for a in (t.read, t.counted))
     square = float((counted**2).sum())
     slope = float((counted * read).sum()) / square if square else math.inf
     if SLOPE[0] < slope < SLOPE[1]:

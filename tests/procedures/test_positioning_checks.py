@@ -121,7 +121,9 @@ def test_not_at_rest_and_moved() -> None:
 def test_a_mistyped_reading_stands_far() -> None:
     t = taken(sound())
     read = t.read.copy()
-    read[0, 3, 2] += 100 * UM
+    read[0, 0, 2] *= 10  # a point one place off
+    assert codes(replace(t, read=read)) == {"readings-far"}
+    read[0, 0, 2] = t.read[0, 0, 2] + 100 * UM
     assert codes(replace(t, read=read)) == {"readings-far"}
     assert codes(replace(t, read=read, counted=read, before=read)) == set()  # the axis itself went there
 
