@@ -66,6 +66,7 @@ PROCEDURES = (
     _room("emf-constant", "Flux and emf constants of a mover's motors, and what the nameplate's flux is meant of"),
     _room("coil-map", "Coils, phases and actuators: is each where the controller takes it to be?"),
     _room("load-response", "Static compliance, friction, deviation and return of a positioned stage under known loads"),
+    _room("positioning", "Repeatability and accuracy of positioning after ISO 230-2, by a reference instrument"),
     _room("force-map", "Terms of the motor's force over displacement, currents and load"),
 )
 

@@ -21,6 +21,7 @@ from bench.cli.truths import (
     loads,
     motor,
     one_axis,
+    positioned,
     pull,
     rotor,
     turning,
@@ -77,4 +78,5 @@ TRUTHS: Mapping[str, Callable[[Any], Found]] = {
     "coil-map": coils.shares,
     "gate-margin": gate.margins,
     "bearing-constant": weights.constants,
+    "positioning": positioned.figures,
 }

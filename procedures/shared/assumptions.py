@@ -231,3 +231,15 @@ LOAD_RESPONSE = (
     "Places other than the one where the axes stood: the force's scale is that of the map there.",
     "Deviations are those that the axis' own encoder reads; where its zero lies nothing here can show.",
 )
+POSITIONING = (
+    "Where the instrument reads: an axis that tilts moves its ends by the tilt times how far they are off the line that is "
+    "read, 10 µm for 100 µrad at 100 mm.",
+    "The temperature: a scale of steel is 11.5 µm longer for each m and kelvin. Figures are those at the temperature of the "
+    "run; nothing is brought to 20 °C.",
+    "A zero of the instrument that is off throughout is in no figure: all of them are of differences. One that wanders faster "
+    "than is stated shows only beyond the axis' own scatter; B_i changes by 0.1 µm for 1 nm/s and 100 s between the two ways.",
+    "A gain of the instrument beyond its certificate, by alignment too, changes E, M and A by its share of the travel: 0.1 µm "
+    "for 10 ppm of 10 mm.",
+    "Another day, load or place: the next five approaches have a scatter of their own, whose s is this one within a factor of "
+    "0.32 to 3.1 (95 %, five and five approaches).",
+)

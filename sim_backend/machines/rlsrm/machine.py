@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from bench.rigfile import RigFile
 from bench.rigfile.toleranced import Toleranced
+from sim_backend import instrument
 from sim_backend.machine import Array, Machine, Numbers, Truth
 from sim_backend.machines.rlsrm import quantities as of
 from sim_backend.machines.rlsrm.defects import DEFECTS, NAMES
@@ -38,7 +39,7 @@ def stated(rig: RigFile) -> dict[str, Toleranced]:
     out |= {"site.gravity": rig.site.gravity, "site.air_density": rig.site.air_density}
     for name, sensor in rig.sensors.items():
         out |= {f"{name}.gain": sensor.gain, f"{name}.offset": sensor.offset}
-    out |= dict(_inline(rig))
+    out |= dict(_inline(rig)) | instrument.stated(rig)
     for name, t in rig.simulation.items():
         if isinstance(t, Toleranced):
             out |= {f"{name}_{end}": t for end in EACH[name]} if name in EACH else {name: t}
