@@ -8,10 +8,11 @@ ADVICE = {
     "CONTACT": "the rotor touched a touchdown bearing; inspect it before levitating again",
     "OVERCURRENT": "look for a short or a load beyond the envelope",
     "OVERSPEED": "check the drive and the speed limit",
-    "HEARTBEAT_LOST": "the host or the link stalled; the controller landed the rotor by itself",
+    "HEARTBEAT_LOST": "the host or the link stalled; the controller made the machine safe by itself",
     "LEVITATION_LOST": "check sensor signs and wiring, amplifier limits and the load",
     "LIFT_TIMEOUT": "the rotor did not reach its place; check sensors, amplifiers and gains",
     "OVERTEMPERATURE": "let the windings cool",
+    "STROKE": "an axis came near the end of its travel; look what pushed it, and at its zero, before it is held again",
     "SENSOR": "check the position sensors and the once-per-turn probe",
 }
 HARMLESS = ("HEARTBEAT_LOST", "COMMUNICATION")

@@ -5,12 +5,19 @@ from __future__ import annotations
 from bench.errors import DeviceFault, FrozenError, StateContradicts
 from bench.link.stillness import STILL_S
 from bench.link.telemetry import TelemetryDecoder
+from bench.procedure.roles import RigState
 from bench.rigfile import RigFile
-from bench.rigfile.binding import UNKNOWN
+from bench.rigfile.binding import HELD, UNKNOWN
 from bench.rigfile.roles import SPEED, told_in
 from drivers import advice
 
-SET_DOWN = ("LAND", "DISABLE", "MAKE_SAFE")
+SET_DOWN = ("LAND", "LET_GO", "DISABLE", "MAKE_SAFE")
+TAKE_HOLD = ("LEVITATE", "HOLD")
+STATES = {"OFF": RigState.OFF, "READY": RigState.READY, "LIFTING": RigState.READY, "LEVITATED": RigState.LEVITATED,
+          "SPINNING": RigState.SPINNING, "LANDING": RigState.LEVITATED, "COASTING": RigState.SPINNING,
+          "HOMING": RigState.READY, "HOLDING": RigState.HELD, "MOVING": RigState.MOVING, "STOPPING": RigState.MOVING,
+          "FAULT": RigState.OFF, UNKNOWN: RigState.SPINNING}  # fmt: skip
+"""What a state of the controller, by its mode, is of the rig."""
 UNASKED_S = 0.1  # for which a state that nobody asked for is more than a wrong sample
 
 
@@ -44,13 +51,13 @@ class Condition:
         code = int(self._telemetry.latest.get("state", 0))
         if code != self._code or not self._since_ns:
             self._code, self._since_ns = code, now_ns
-        if not self._asked_down and self.mode in ("LEVITATED", "SPINNING"):
+        if not self._asked_down and self.mode in HELD:
             self._held = True
 
     def commanded(self, name: str) -> None:
         """A command is about to be sent."""
         self._asked_before = self._asked_down
-        if name == "LEVITATE":
+        if name in TAKE_HOLD:
             self._held = self._asked_down = False
         elif name in SET_DOWN:
             self._asked_down = True

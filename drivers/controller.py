@@ -13,23 +13,22 @@ from bench.link.telemetry import TelemetryDecoder
 from bench.procedure.roles import RigState
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile, roles
-from bench.rigfile.binding import UNKNOWN
 from bench.rigfile.envelope import Envelope
+from bench.rigfile.stage import is_stage
 from drivers import advice, handshake, unheard, waiting
 from drivers.capture import ControllerCapture
 from drivers.capture_upload import Upload
+from drivers.condition import STATES
 from drivers.dialogue import Dialogue, no_reply
 from drivers.orders import Orders
 from drivers.sight import Sight
+from drivers.stage import Stage
 from drivers.turning import Turning
 from drivers.watch import Watch
 
 TOUCHED = 0.5  # rad/s, above which a landed shaft is not at rest
 FIRST_S = 1.5  # for the first telemetry, and for the last owner to be gone
 BEHIND_S = 15.0  # a controller further behind the host's clock is not waited for
-STATES = {"OFF": RigState.OFF, "READY": RigState.READY, "LIFTING": RigState.READY, "LEVITATED": RigState.LEVITATED,
-          "SPINNING": RigState.SPINNING, "LANDING": RigState.LEVITATED, "COASTING": RigState.SPINNING,
-          "FAULT": RigState.OFF, UNKNOWN: RigState.SPINNING}  # fmt: skip
 
 
 class Controller:
@@ -57,6 +56,7 @@ class Controller:
         self.companions: list[Callable[[], None]] = []  # polled with it: other devices of the rig
         self._orders = Orders(rig, self.requests, session, self.envelope, lambda: self.mode, self._wait)
         self.rotation = Turning(rig, self._orders, self.telemetry, self.clock, base.now_ns, self.sight.speeds_rad_s)
+        self.stage = Stage(self) if is_stage(rig) else None
         self.capture: ControllerCapture | None = None
         if rig.capture is not None:
             upload = Upload(rig, link, self.requests, self.clock)
@@ -106,7 +106,7 @@ class Controller:
         if self.mode == "FAULT":
             advice.may_clear("controller", self.fault, clear_fault)
             self.cleared = self.fault
-            self._command("CLEAR_FAULT", "OFF", 1.0)
+            self.reach("CLEAR_FAULT", "OFF", 1.0)
         self.restored = self._orders.restore()
         self.watch.begin()
         self.guarded = True
@@ -205,23 +205,23 @@ class Controller:
 
     def enable(self) -> None:
         """OFF to READY."""
-        self._command("ENABLE", "READY", 1.0)
+        self.reach("ENABLE", "READY", 1.0)
 
     def levitate(self) -> None:
         """READY to LEVITATED."""
-        self._command("LEVITATE", "LEVITATED", self._lift_s() + 6.0, self._lift_s(0.0))
+        self.reach("LEVITATE", "LEVITATED", self._lift_s() + 6.0, self._lift_s(0.0))
 
     def lift(self) -> None:
         """READY to LIFTING: as `levitate`, without waiting for its end."""
-        self._command("LEVITATE", "LIFTING", 1.0)
+        self.reach("LEVITATE", "LIFTING", 1.0)
 
     def land(self) -> None:
         """LEVITATED to READY."""
-        self._command("LAND", "READY", self._lift_s() + 3.0, self._lift_s(0.0))
+        self.reach("LAND", "READY", self._lift_s() + 3.0, self._lift_s(0.0))
 
     def disable(self) -> None:
         """READY to OFF."""
-        self._command("DISABLE", "OFF", 1.0)
+        self.reach("DISABLE", "OFF", 1.0)
 
     def command(self, name: str, slow: Callable[[], bool] | None = None) -> None:
         """Send a command and wait for its reply, not for its effect; `drivers.orders.Orders.command` has the errors. LAND and
@@ -279,7 +279,12 @@ class Controller:
         except KeyError:
             raise BenchError(f"the telemetry has no channel {channel}") from None
 
-    def _command(self, name: str, goal: str, timeout_s: float, expected_s: float = 0.0) -> None:
+    def reach(self, name: str, goal: str, timeout_s: float, expected_s: float = 0.0) -> None:
+        """Send a command and wait for the state that it leads to, so long beyond the time that it is expected to take.
+
+        Raises:
+            StateNotReached: it is not reached; and as `command`.
+        """
         self.command(name)
         self.clock.sleep(expected_s)
         self.wait(lambda: self.mode == goal, timeout_s, lambda: StateNotReached(

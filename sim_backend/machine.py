@@ -80,6 +80,7 @@ class Machine:
         radial: columns of the plant's rows that come to rest at the end of a lift.
         integral_gains: parameters that the defect `integrator_factor` scales.
         turns: whether the controller can turn the rotor by itself.
+        levitates: whether it does; a machine that does not has the states and commands of a stage.
         channels: names without which the telemetry of a DBC cannot be filled.
         places: which columns of the rows are told, and where each goes among the signals of the telemetry.
         spoil: puts planted defects of sensors into telemetry (n, signals).
@@ -120,6 +121,7 @@ class Machine:
     columns: Callable[[RigFile], tuple[str, ...]] | None = None
     controls: frozenset[str] = frozenset()
     motions: Motions = NONE
+    levitates: bool = True
     tick_s: float = TICK_S
     period_s: float = PERIOD_TICKS * TICK_S
     controller: Callable[[RigFile, Truth, Sequence[Fault], int], Any] | None = None

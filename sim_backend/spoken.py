@@ -6,7 +6,13 @@ from collections.abc import Mapping
 
 from bench import units
 from bench.rigfile import RigFile
-from bench.rigfile.binding import COMMANDS, MODES, Binding
+from bench.rigfile.binding import (
+    LEVITATION_COMMANDS,
+    LEVITATION_MODES,
+    STAGE_COMMANDS,
+    STAGE_MODES,
+    Binding,
+)
 from bench.rigfile.bit import Bit
 from bench.rigfile.capabilities import Capabilities
 from bench.rigfile.messages import Message, MessageMap
@@ -47,12 +53,13 @@ def own_words(messages: MessageMap, machine: Machine, binding: Binding) -> bool:
     known = {s.name: s for s in messages[TELEMETRY].signals}
     if any(name not in known for name in (*machine.channels, *machine.windings, *CONTROLLER)):
         return False
-    codes = (("state", MODES), ("fault", ("NONE",)))
+    modes, asked = (LEVITATION_MODES, LEVITATION_COMMANDS) if machine.levitates else (STAGE_MODES, STAGE_COMMANDS)
+    codes = (("state", modes), ("fault", ("NONE",)))
     if any(name not in known[signal].choices.values() for signal, names in codes for name in names):
         return False
     commands = {s.name: s for s in messages["Command"].signals}
     named = set(commands["code"].choices.values()) if "code" in commands else set()
-    return set(COMMANDS) <= named and _in_words(messages[TELEMETRY])
+    return set(asked) <= named and _in_words(messages[TELEMETRY])
 
 
 def _in_words(message: Message) -> bool:

@@ -134,6 +134,6 @@ def test_what_a_name_means_without_a_binding() -> None:
     assert own.binding.command("SPIN") == {"HostControl.Demand": "Rotate"}
     assert [native.binding.mode(x) for x in ("COASTING", "Coasting")] == ["COASTING", None]
     assert [own.binding.mode(x) for x in ("RunDown", "OFF", "Nonsense")] == ["COASTING", "OFF", None]
-    for name in binding.COMMANDS:
+    for name in binding.LEVITATION_COMMANDS:
         assert native.binding.knows(name, native.messages)
         assert own.binding.knows(name, own.messages) == (name not in ("IDENTIFY", "RELEASE"))

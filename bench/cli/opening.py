@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from bench.cli import console
 from bench.cli.safety import making_safe, may_touch
+from bench.cli.stage_safety import making_stage_safe
 from bench.cli.touching import approach, standing
 from bench.clock import Clock, WallClock
 from bench.errors import BenchError, ConfigError
@@ -23,7 +24,7 @@ from bench.procedure.rig import Rig
 from bench.procedure.roles import Operator
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile, linkurl
-from bench.rigfile.envelope import HELD
+from bench.rigfile.binding import HELD
 from bench.rigfile.registers import RegisterPort
 from bench.run.job import Connect, OpenRig, WatchedClock
 from bench.run.supervisor import Supervisor
@@ -271,7 +272,8 @@ def _opened(
                       replies_wrong_length=controller.requests.wrong_length, stuck=controller.watch.stuck.found)  # fmt: skip
 
     rig = Rig(controller.rig, controller.clock, controller, controller.rotation, operators[0], controller.telemetry.counters,
-              health, controller.link.close, bus.drive, bus.supply, bus.thermal, controller.capture)  # fmt: skip
+              health, controller.link.close, bus.drive, bus.supply, bus.thermal, controller.capture,
+              controller.stage)  # fmt: skip
     found = [fault_injection.announced(injected)] if injected else []
     if controller.cleared:
         found.append(
@@ -286,5 +288,7 @@ def _opened(
     if bus.cleared:
         found.append(Finding("fault-cleared", f"fault {bus.cleared} of an earlier run was cleared", "drive"))
     streams = [controller.telemetry.layout, *bus.layouts]
-    steps, aftermath = making_safe(controller, base, bus.drive)
+    steps, aftermath = (
+        making_safe(controller, base, bus.drive) if controller.stage is None else making_stage_safe(controller, base)
+    )
     return OpenRig(rig, streams, attach, unguard, steps, truth, found, controller.catch_up, aftermath)

@@ -28,6 +28,7 @@ STANDS = {
     "READY": "The amplifiers are on.",
     "LEVITATED": "The shaft levitates and the amplifiers are on: touch nothing but what you are asked to.",
     "SPINNING": "The shaft levitates and may turn, and the amplifiers are on: touch nothing but what you are asked to.",
+    "HOLDING": "The axes are held and the amplifiers are on: touch nothing but what you are asked to.",
 }
 MOVES = "The shaft may move, and the amplifiers are on: touch nothing but what you are asked to."
 

@@ -18,7 +18,8 @@ from bench.link.codec import Decoder
 from bench.link.frames import ERROR, FrameBatch
 from bench.link.stillness import CLOCKS, CODES
 from bench.rigfile import RigFile
-from bench.rigfile.envelope import HELD, Envelope
+from bench.rigfile.binding import HELD
+from bench.rigfile.envelope import Envelope
 from bench.rigfile.messages import Message, Signal
 
 Values = npt.NDArray[np.float64]

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.rigfile import RigFile
+from bench.rigfile.binding import HELD
 from bench.samples import SampleBlock
 
 STILL_S = 1.0  # what does not move for so long stands
@@ -71,9 +72,7 @@ class StuckChannels:
 
     def __init__(self, rig: RigFile) -> None:
         self._names = [name for name in rig.channels if rig.noisy(name)]
-        self._held = {
-            c for c, name in rig.choices("state").items() if rig.binding.mode(name) in ("LEVITATED", "SPINNING")
-        }
+        self._held = {c for c, name in rig.choices("state").items() if rig.binding.mode(name) in HELD}
         self._last: npt.NDArray[np.float64] | None = None  # of the block before, while the rotor is held
         self._moved_ns = np.zeros(len(self._names), np.int64)
         self._noise_seen = False

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from bench.clock import Clock
-from bench.procedure.roles import Capture, Drive, Levitation, Operator, Rotation, Supply, Thermal
+from bench.procedure.roles import Capture, Drive, Levitation, Motion, Operator, Rotation, Supply, Thermal
 from bench.rigfile import RigFile
 
 if TYPE_CHECKING:  # every procedure imports this module, and a listing of them needs no link
@@ -31,3 +31,4 @@ class Rig:
     supply: Supply | None = None
     thermal: Thermal | None = None
     capture: Capture | None = None
+    motion: Motion | None = None  # of a machine that does not levitate

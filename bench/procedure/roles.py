@@ -17,6 +17,8 @@ class RigState(StrEnum):
     READY = "READY"
     LEVITATED = "LEVITATED"
     SPINNING = "SPINNING"
+    HELD = "HELD"  # of a machine that does not levitate: its axes are held where they were sent
+    MOVING = "MOVING"
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +75,28 @@ class Rotation(Protocol):
     def point(self, angle_rad: float) -> None: ...  # returns when the rotor stands at that angle
     def spin(self, rad_s: float) -> None: ...  # returns when the rotor turns at that speed
     def stop(self) -> None: ...  # returns when the rotor is below the landing speed
+
+
+class Motion(Protocol):
+    """The device that positions the axes of a machine that does not levitate. Every call returns when the controller reports
+    the state, or raises. `set`, `write`, `get` and `reading` as those of `Levitation`."""
+
+    @property
+    def state(self) -> RigState: ...
+    def enable(self) -> None: ...  # OFF -> READY
+    def home(self) -> None: ...  # READY -> READY with zeros that are known; nothing where they are
+    def hold(self) -> None: ...  # READY -> HELD, where it stands
+    def let_go(self) -> None: ...  # HELD -> READY: without currents
+    def disable(self) -> None: ...  # READY -> OFF
+    def move(
+        self, targets: Mapping[str, float]
+    ) -> None: ...  # HELD: by axis, m or rad; returns when set points rest there
+    def play(self) -> None: ...  # HELD -> MOVING: waves that are set begin
+    def stop(self) -> None: ...  # MOVING -> HELD: set points brake to rest
+    def set(self, parameter: str, value: float) -> None: ...
+    def write(self, values: Mapping[str, float]) -> None: ...
+    def get(self, parameter: str) -> float: ...
+    def reading(self, channel: str) -> float: ...
 
 
 class Operator(Protocol):

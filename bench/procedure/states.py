@@ -1,6 +1,7 @@
 """Transitions between rig states: the one place that knows their order.
 
-OFF -> READY -> LEVITATED -> SPINNING and back. Levitation is not released while the rotor turns above the landing speed.
+OFF -> READY -> LEVITATED -> SPINNING and back; of a machine that does not levitate, OFF -> READY -> HELD -> MOVING and back.
+Levitation is not released while the rotor turns above the landing speed.
 """
 
 from __future__ import annotations
@@ -11,36 +12,53 @@ from contextlib import contextmanager
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 
-ORDER = (RigState.OFF, RigState.READY, RigState.LEVITATED, RigState.SPINNING)
+LEVITATION = (RigState.OFF, RigState.READY, RigState.LEVITATED, RigState.SPINNING)
+STAGE = (RigState.OFF, RigState.READY, RigState.HELD, RigState.MOVING)
+ENABLED, CARRIED, DRIVEN = 1, 2, 3
+"""Places in either order: ready, held, and on the move."""
 
 
 def transition(rig: Rig, target: RigState) -> None:
     """Bring the rig to a state, step by step; nothing happens when it is there.
 
-    SPINNING is reached by a procedure that sets a speed; asking for it here means LEVITATED at least.
+    SPINNING and MOVING are reached by a procedure that sets a speed or a wave; asking for them here means that the machine is
+    held at least.
     """
-    goal = min(ORDER.index(target), ORDER.index(RigState.LEVITATED))
-    while (here := ORDER.index(rig.levitation.state)) != goal:
+    order = STAGE if rig.motion is not None else LEVITATION
+    goal = min(order.index(target), CARRIED)
+    while (here := order.index(rig.levitation.state)) != goal:
         if here > goal:
-            _down(rig, ORDER[here])
-        elif ORDER[here] is RigState.OFF:
-            rig.levitation.enable()
+            _down(rig, here)
         else:
-            rig.levitation.levitate()
-        if here < goal and ORDER.index(rig.levitation.state) <= here:
-            raise RuntimeError(f"the rig stays in {ORDER[here]}")
-        if here == ORDER.index(RigState.SPINNING) and goal == ORDER.index(RigState.LEVITATED):
+            _up(rig, here)
+        if here < goal and order.index(rig.levitation.state) <= here:
+            raise RuntimeError(f"the rig stays in {order[here]}")
+        if here == DRIVEN and goal == CARRIED:
             continue
 
 
-def _down(rig: Rig, here: RigState) -> None:
-    if here is RigState.SPINNING:
-        rig.rotation.stop()
-    elif here is RigState.LEVITATED:
-        rig.rotation.stop()
-        rig.levitation.land()
+def _up(rig: Rig, here: int) -> None:
+    if here < ENABLED:
+        rig.levitation.enable()
+    elif rig.motion is not None:
+        rig.motion.home()
+        rig.motion.hold()
     else:
+        rig.levitation.levitate()
+
+
+def _down(rig: Rig, here: int) -> None:
+    if here == ENABLED:
         rig.levitation.disable()
+    elif rig.motion is not None:
+        if here == DRIVEN:
+            rig.motion.stop()
+        else:
+            rig.motion.let_go()
+    else:
+        rig.rotation.stop()
+        if here == CARRIED:
+            rig.levitation.land()
 
 
 @contextmanager

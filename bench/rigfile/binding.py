@@ -17,10 +17,39 @@ from bench.rigfile.part import Part
 if TYPE_CHECKING:
     pass
 
-Mode = Literal["OFF", "READY", "LIFTING", "LEVITATED", "SPINNING", "LANDING", "COASTING", "FAULT"]
-MODES: tuple[Mode, ...] = ("OFF", "READY", "LIFTING", "LEVITATED", "SPINNING", "LANDING", "COASTING", "FAULT")
+Mode = Literal["OFF", "READY", "LIFTING", "LEVITATED", "SPINNING", "LANDING", "COASTING", "HOMING", "HOLDING", "MOVING",
+               "STOPPING", "FAULT"]  # fmt: skip
+LEVITATION_MODES: tuple[Mode, ...] = (
+    "OFF",
+    "READY",
+    "LIFTING",
+    "LEVITATED",
+    "SPINNING",
+    "LANDING",
+    "COASTING",
+    "FAULT",
+)
+STAGE_MODES: tuple[Mode, ...] = ("OFF", "READY", "HOMING", "HOLDING", "MOVING", "STOPPING", "FAULT")
+"""Of a machine that does not levitate: its axes are held, or move."""
+MODES: tuple[Mode, ...] = tuple(dict.fromkeys((*LEVITATION_MODES, *STAGE_MODES)))
+HELD: tuple[Mode, ...] = ("LEVITATED", "SPINNING", "HOLDING", "MOVING", "STOPPING")
+"""In which the rotor, or the axes of a stage, are held by their controller."""
 UNKNOWN, UNSEEN = "UNKNOWN", "UNSEEN"  # a state that has no name, and one that nothing tells
-COMMANDS = ("ENABLE", "DISABLE", "LEVITATE", "LAND", "SPIN", "STOP", "MAKE_SAFE", "CLEAR_FAULT", "IDENTIFY", "RELEASE")
+LEVITATION_COMMANDS = (
+    "ENABLE",
+    "DISABLE",
+    "LEVITATE",
+    "LAND",
+    "SPIN",
+    "STOP",
+    "MAKE_SAFE",
+    "CLEAR_FAULT",
+    "IDENTIFY",
+    "RELEASE",
+)
+STAGE_COMMANDS = ("ENABLE", "DISABLE", "HOME", "HOLD", "MOVE", "STOP", "LET_GO", "MAKE_SAFE", "CLEAR_FAULT", "IDENTIFY",
+                  "RELEASE")  # fmt: skip
+COMMANDS = tuple(dict.fromkeys((*LEVITATION_COMMANDS, *STAGE_COMMANDS)))
 
 
 class Binding(Part):

@@ -15,6 +15,13 @@ from bench.rigfile.bit import Bit
 from bench.rigfile.capabilities_of_coils import CoilMap
 from bench.rigfile.capabilities_of_loops import CurrentStep, ForceCurrent, Hold, LoopInjection, Motion
 from bench.rigfile.capabilities_of_power import DcLink
+from bench.rigfile.capabilities_of_stages import (
+    AXIS_PARAMETERS,
+    TEST_PARAMETERS,
+    WAVE_PARAMETERS,
+    PhaseTest,
+    Positioning,
+)
 from bench.rigfile.elements import Name
 from bench.rigfile.part import Part
 from bench.rigfile.toleranced import Toleranced
@@ -157,6 +164,8 @@ class Capabilities(Part):
     force_currents: Mapping[Name, ForceCurrent] = {}
     coil_map: CoilMap | None = None
     dc_link: DcLink | None = None
+    positioning: Positioning | None = None
+    phase_test: PhaseTest | None = None
     model: Mapping[Name, str] = {}
     landing_speed: str = ""
     lift_time: str = ""
@@ -225,6 +234,10 @@ def _tables(c: Capabilities) -> Iterator[tuple[str, str | Mapping[str, str]]]:
         yield f"force_currents.{motor}", {k: v for k in FORCE_PARAMETERS if (v := getattr(one, k))}
     if c.coil_map is not None:
         yield from _of_coils(c.coil_map)
+    if c.positioning is not None:
+        yield from _of_axes(c.positioning)
+    if c.phase_test is not None:
+        yield from ((f"phase_test.{key}", getattr(c.phase_test, key)) for key in TEST_PARAMETERS)
     yield "model", c.model
     for key in ("landing_speed", "lift_time", "watchdog", "current_limit"):
         yield key, getattr(c, key)
@@ -241,6 +254,13 @@ def _of_coils(found: CoilMap) -> Iterator[tuple[str, str | Mapping[str, str]]]:
         yield from ((f"coil_map.systems.{name}.{key}", getattr(system, key)) for key in ("d", "q", "zero"))
     for axis, values in found.still.items():
         yield f"coil_map.still.{axis}", {name: name for name in values}
+
+
+def _of_axes(can: Positioning) -> Iterator[tuple[str, str | Mapping[str, str]]]:
+    for name, axis in can.axes.items():
+        yield from ((f"positioning.axes.{name}.{key}", getattr(axis, key)) for key in AXIS_PARAMETERS)
+        if axis.wave is not None:
+            yield from ((f"positioning.axes.{name}.wave.{key}", getattr(axis.wave, key)) for key in WAVE_PARAMETERS)
 
 
 def is_bound(c: Capabilities, key: str) -> bool:

@@ -9,10 +9,13 @@ from bench.rigfile.binding import COMMANDS
 from bench.rigfile.messages import MessageMap, Signal
 from bench.rigfile.model import RigFile
 from bench.rigfile.roles import SPEED, told_in
+from bench.rigfile.stage import is_stage
 from bench.rigfile.turned import turned
 
 NEEDED = ("ENABLE", "DISABLE", "LEVITATE", "LAND", "MAKE_SAFE")
 """Commands that no run and no make-safe can do without; the others are asked for only where the controller has them."""
+STAGE_NEEDED = ("ENABLE", "DISABLE", "HOLD", "STOP", "LET_GO", "MAKE_SAFE")
+"""Those of a machine that does not levitate."""
 
 PROTOCOL = {
     "Command": ("code",), "CommandReply": ("status",), "ParamSet": ("index", "value"), "ParamGet": ("index",),
@@ -36,7 +39,9 @@ WRAP_S = 1.0  # counters must not come round within this: a loss, or a restart, 
 
 
 def _needed(rig: RigFile) -> tuple[str, ...]:
-    """NEEDED, and STOP where something may turn the shaft."""
+    """NEEDED, and STOP where something may turn the shaft; those of a stage where nothing levitates."""
+    if is_stage(rig):
+        return STAGE_NEEDED
     return (*NEEDED, "STOP") if turned(rig) else NEEDED
 
 

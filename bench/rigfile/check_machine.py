@@ -13,6 +13,7 @@ from typing import Any
 
 from bench import units
 from bench.errors import Problem
+from bench.rigfile.check_stages import encoders_of
 from bench.rigfile.elements import From, Of
 from bench.rigfile.model import RigFile
 from bench.rigfile.numbers import Sum, Term
@@ -33,8 +34,8 @@ KINDS = {"at": "m", "by": "m", "gap": "m", "clearance": "m", "radius": "m", "len
 POSITIVE = ("gap", "clearance", "radius", "length", "mass", "polar_inertia", "transverse_inertia")
 LIKELY = {"gap": (1e-6, 1e-2), "clearance": (1e-6, 0.1), "radius": (1e-4, 10.0), "at": (0.0, 10.0), "by": (0.0, 10.0),
           "centre_of_mass": (0.0, 10.0)}  # m; what is beyond is a slip of the unit  # fmt: skip
-TABLES = ("shaft", "bearings", "probes", "mark", "rings", "balancing", "coupling", "hooks", "levers", "motors",
-          "encoders")  # fmt: skip
+TABLES = ("shaft", "bearings", "probes", "mark", "rings", "balancing", "coupling", "hooks", "levers", "motors")
+"""Tables with numbers of one kind each; those of encoders are looked at with the axes that they are."""
 
 Found = tuple[str, str, str]
 
@@ -52,6 +53,7 @@ def _all(rig: RigFile) -> Iterator[Found]:
     yield from _channels(rig)
     yield from _axes(rig)
     yield from _motors(rig)
+    yield from encoders_of(rig)
     yield from _certificates(rig)
     yield from _aliases(rig)
     if rig.customer is not None and rig.laboratory is not None and rig.laboratory.customer:

@@ -34,13 +34,15 @@ SOME_GEOMETRY = {
     "com_to_outboard_balance": "centre of mass to the outboard balancing plane",
     "balance_radius": "shaft axis to where weights are fixed in the balancing planes",
     "com_to_coupling": "centre of mass to the coupling of an external motor",
+    "bearing_radius": "shaft axis to the balls of a bearing that lets it turn and slide",
     "coupling_stiffness": "radial stiffness of that coupling",
 }
 """Lengths that a rig may have; the procedures that need one say so."""
 MACHINE = {"pole_pairs": "1", "polar_inertia": "kg m^2", "ring_inertia": "kg m^2", "amb_asymmetry": "1",
            "radial_axes": "rad", "runout": "m", "coupling_offset": "m", "mass": "kg", "transverse_inertia": "kg m^2",
            "weight_mass": "kg", "weight_angle": "rad", "drive_drag": "N m",
-           "segment_gain": "1", "torque_ripple": "N m/A"}  # fmt: skip
+           "segment_gain": "1", "torque_ripple": "N m/A", "resistance": "Ohm", "rotor_poles": "1", "ring_mass": "kg",
+           "added_mass": "kg", "added_mass_inertia": "kg m^2"}  # fmt: skip
 
 
 def problems_of(rig: RigFile) -> Iterator[Problem]:

@@ -10,6 +10,7 @@ from bench.errors import Problem
 from bench.rigfile import protection
 from bench.rigfile.model import Channel, RigFile
 from bench.rigfile.registers import Register
+from bench.rigfile.stage import axes_of, is_stage
 
 BY_KIND = ("max_current_A", "max_temperature_K", "max_speed_rad_s", "max_levitated_position_m")
 NEEDED = {
@@ -29,6 +30,7 @@ def problems_of(rig: RigFile) -> Iterator[Problem]:
             yield from _own(rig, f"devices.{device}.registers.{name}", register)
     yield from _kinds(rig)
     yield from _levitated(rig)
+    yield from _positioned(rig)
 
 
 def _kinds(rig: RigFile) -> Iterator[Problem]:
@@ -66,6 +68,21 @@ def _own(rig: RigFile, key: str, reading: Channel | Register) -> Iterator[Proble
         yield Problem(rig.path, f"{key}.protect", f"low {limit.low:g}, high {limit.high:g}", "low < high")
     if reading.unprotected:
         yield Problem(rig.path, f"{key}.unprotected", "a reason, beside `protect`", "one of the two")
+
+
+def _positioned(rig: RigFile) -> Iterator[Problem]:
+    """Of axes that are positioned, each stroke and each rate that is told has a limit, and some current has one."""
+    if not is_stage(rig) or any(c.unit not in units.UNITS for c in rig.channels.values()):
+        return
+    found = {p.name: p.unit for p in protection.of_channels(rig)}
+    for name, axis in axes_of(rig).items():
+        for channel in (axis.channel if axis.measures == "stroke" else "", axis.speed):
+            if channel in rig.channels and channel not in found:
+                yield Problem(rig.path, f"channels.{channel}.protect", f"nothing, though {name} is moved",
+                              'low and high, in SI; of a stroke with when = "held", as it is known then')  # fmt: skip
+    if "A" not in found.values():
+        what, expected = NEEDED["A"]
+        yield Problem(rig.path, "envelope", f"no {what} that is protected, though the machine is moved", expected)
 
 
 def _levitated(rig: RigFile) -> Iterator[Problem]:

@@ -8,15 +8,22 @@ from bench.rigfile.binding import MODES
 from bench.rigfile.check_binding import KEY, Found, signal_at
 from bench.rigfile.messages import MessageMap
 from bench.rigfile.model import RigFile
+from bench.rigfile.stage import is_stage
 
 GOALS = ("OFF", "READY", "LEVITATED", "FAULT")
 """What no run can do without: a state for each."""
+STAGE_GOALS = ("OFF", "READY", "HOLDING", "FAULT")
+"""And where nothing levitates."""
 
 
 def problems_of(rig: RigFile, messages: MessageMap) -> Iterator[Found]:
     """Key, found and expected of every state without a meaning, of meanings without a state, and of names for no fault."""
     yield from _states(rig, messages)
     yield from _faults(rig, messages)
+
+
+def _goals(rig: RigFile) -> tuple[str, ...]:
+    return STAGE_GOALS if is_stage(rig) else GOALS
 
 
 def _states(rig: RigFile, messages: MessageMap) -> Iterator[Found]:
@@ -34,7 +41,7 @@ def _states(rig: RigFile, messages: MessageMap) -> Iterator[Found]:
         if state not in signal.choices.values():
             known = ", ".join(signal.choices.values()) or "none"
             yield f"{KEY}.states.{state}", "a state that the controller does not have", f"one of {known}"
-    if None not in meant and (missing := [m for m in GOALS if m not in meant]):
+    if None not in meant and (missing := [m for m in _goals(rig) if m not in meant]):
         yield (
             f"{KEY}.states",
             f"no state that amounts to {', '.join(missing)}",

@@ -154,10 +154,11 @@ class Pulley(Part):
 
 
 class Hook(Part):
-    """Where a known force pulls at the shaft: down, or in `pull` by a pulley."""
+    """Where a known force pulls at the shaft: down, or in `pull` by a pulley, or `along` it, to one of its ends."""
 
     at: Place
     pull: Direction | None = None
+    along: Literal["far", "near"] | None = None
     pulley: Pulley | None = None
 
 
@@ -187,11 +188,15 @@ class Motor(Part):
 
 
 class Encoder(Part):
-    """What measures a coordinate of a machine that does not float: an angle over many turns, or a stroke."""
+    """What measures a coordinate of a machine that does not float: an angle over many turns, or a stroke. `counts` of a turn;
+    `pitch` m or rad a count; `error`, how far it may read off by itself, beside that (m or rad: once a turn, along its
+    scale)."""
 
     channel: str
     measures: Literal["angle", "stroke"]
     counts: int | None = Field(None, gt=0)
+    pitch: Number | None = None
+    error: Number | None = None
 
 
 class Certificate(Part):

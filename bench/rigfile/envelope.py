@@ -11,12 +11,12 @@ import numpy.typing as npt
 
 from bench.errors import InterlockError
 from bench.rigfile import protection
+from bench.rigfile.binding import HELD
 from bench.rigfile.model import RigFile
 from bench.rigfile.protection import Protected
 from bench.samples import SampleBlock
 
 Values = npt.NDArray[np.float64]
-HELD = ("LEVITATED", "SPINNING")
 
 
 @dataclass(frozen=True)
