@@ -71,7 +71,7 @@ def fitted(rows: Rows, first: Array, known: Sequence[Known]) -> Found:
     said, u = np.array([k.value for k in known]), np.array([k.u for k in known])
     at, n = Terms(len(rows.x)), len(rows.flux)
     observed = np.concatenate([rows.flux, said, [1.0]])
-    base = np.hypot(FLOOR, SHARE * rows.flux)
+    base = np.sqrt(FLOOR**2 + (SHARE * rows.flux) ** 2 + (rows.noise * rows.flux / rows.current) ** 2)
 
     def model(t: Array) -> Array:
         return np.concatenate([flux(t, rows), t[numbers], [t[at.each("gain")].mean()]])
@@ -107,7 +107,7 @@ def _by_pulses(by: Array, rows: Rows, left: Array, free: int) -> Array:
 
 def by_place(found: Found, rows: Rows) -> tuple[Array, Array]:
     """G (places, 6) of the fit, and what the pulses' fluxes have beyond it, as a share of it, mean over each pulse's flanks."""
-    g, _ = inductance(found.terms, rows)
+    g, _, _ = inductance(found.terms, rows)
     per = rows.place * PHASES + rows.phase
     weight = rows.flux**2
     fit = rows.flux - found.residuals

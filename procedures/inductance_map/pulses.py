@@ -10,12 +10,13 @@ voltage and g i + o of the current give the same R g_u/g at the held end, and, w
     up:    psi read = g_u psi + (b - R o)(t - integral of i/i_end)
     down:  psi read = g_u psi - b (t - integral of i/i_end) + R (o_down t - o integral of i/i_end) + L o_down
 
-(L o_down: the last reading's flux is taken for its own), so that gains cost no shape, and offsets little: R t is small against an inductance. `late`, `lean` and `lag` below are the
-factors of b, o and o_down.
+(L o_down: what is read at the end is taken for a current that has its flux), so that gains cost no shape, and offsets little: R t is
+small against an inductance. `late`, `lean` and `lag` below are the factors of b, o and o_down.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,7 +44,7 @@ class Flank:
 @dataclass(frozen=True)
 class Pulse:
     """What one pulse shows: current, voltage and resistance of its end, the greatest voltage up, both flanks; what it leaves of
-    its flux, as a share of the greatest."""
+    its flux, as a share of the greatest; by what share R grows in a second; noise of the current's reading, A."""
 
     current: float
     voltage: float
@@ -52,10 +53,13 @@ class Pulse:
     up: Flank
     down: Flank
     left: float
+    warming: float
+    noise: float
 
 
-def read(u: Array, i: Array, step_s: float) -> Pulse | None:
-    """Of a capture: `u` (n,) V over the step that ends at each sample, `i` (n,) A. None where there is no pulse."""
+def read(u: Array, i: Array, step_s: float, warming: float | None = None) -> Pulse | None:
+    """Of a capture: `u` (n,) V over the step that ends at each sample, `i` (n,) A. None where there is no pulse. `warming` of R
+    as the mean of pulses has it; None: as this pulse shows it, which noise makes uncertain."""
     size = np.abs(i)
     if len(i) < 20 or not (np.isfinite(u).all() and np.isfinite(i).all()) or size.max() < LEAST_A:
         return None
@@ -65,7 +69,7 @@ def read(u: Array, i: Array, step_s: float) -> Pulse | None:
     end, volts = float(i[first:last].mean()), float(u[first:last].mean())
     time = np.arange(len(i)) * step_s
     mean = np.concatenate([[0.0], 0.5 * (i[1:] + i[:-1])])  # over the step that ends at a sample
-    ohm, warmer = _resistance(u, i, (mean / end) ** 2, (first, last))
+    ohm, rate, warmer = _resistance(u, i, np.cumsum((mean / end) ** 2) * step_s, (first, last), warming)
     psi, share = np.cumsum(u - ohm * (1 + warmer) * mean) * step_s, np.cumsum(mean) * step_s / end
     up, down = _rising(size, first), _falling(size, last - 1)
     start, stop = up[0], down[-1]
@@ -77,19 +81,23 @@ def read(u: Array, i: Array, step_s: float) -> Pulse | None:
     since, gone = time - time[start] - step_s / 2, share - share[start]  # an offset is in half of the first step's mean
     until, left = time[stop] - time, share[stop] - share
     rising = flank(up, psi - psi[start], since - gone, ohm * (gone - since), np.zeros(len(i)))
-    henry = _inductance(rising)
-    falling = flank(down, psi - psi[stop] + henry * i[stop], left - until, -ohm * left, ohm * until + henry)
+    henry, rest = _inductance(rising), slice(stop - AFTER // 2, stop + 1)
+    final = float((psi[rest] - henry * i[rest]).mean())
+    falling = flank(down, psi - final, left - until, -ohm * left, ohm * until + henry)
     top = float(psi[first:last].mean() - psi[start])
     highest = float(np.abs(u[start:first]).max())
-    return Pulse(end, volts, ohm, highest, rising, falling, float(psi[stop] - psi[start]) / (top or 1e-12))
+    noise = float(np.diff(i[first:last]).std()) / math.sqrt(2)
+    return Pulse(end, volts, ohm, highest, rising, falling, (final - float(psi[start])) / (top or 1e-12), rate, noise)
 
 
-def _resistance(u: Array, i: Array, heat: Array, held: tuple[int, int]) -> tuple[float, Array]:
-    """R in the middle of the held end, and by how much of it the winding is warmer at each sample: it warms as the integral of
-    i^2, by as much as u/i grows while the current is held (6 A in 7.8 Ohm and 60 J/K: 0.2 permille in 10 ms)."""
-    window, warmth = slice(*held), np.cumsum(heat)
-    slope, ohm = np.polyfit(warmth[window] - warmth[window].mean(), u[window] / i[window], 1)
-    return float(ohm), (warmth - warmth[window].mean()) * slope / ohm
+def _resistance(u: Array, i: Array, heat: Array, held: tuple[int, int], warming: float | None) -> tuple[float, float, Array]:
+    """R in the middle of the held end, the share of it that comes in a second of the end's current, and by how much of it the
+    winding is warmer at each sample: it warms as the integral of i^2, by as much as u/i grows while the current is held (6 A in
+    7.8 Ohm and 60 J/K: 0.2 permille in 10 ms)."""
+    window, middle = slice(*held), float(heat[slice(*held)].mean())
+    slope, ohm = np.polyfit(heat[window] - middle, u[window] / i[window], 1)
+    rate = float(slope / ohm) if warming is None else warming
+    return float(ohm), rate, (heat - middle) * rate
 
 
 def _inductance(rising: Flank) -> float:

@@ -223,3 +223,10 @@ PULL_RATIO = (
     "to 0.66 µm.",
     "Force constants of both planes apart: no set point tells them, only what they have together.",
 )
+INDUCTANCE_MAP = (
+    "Currents' readings that are all wrong by a share change slope and leakage by that share, saturation by its opposite; "
+    "voltages' change slope and leakage. Phases that are alike show one that is off from the others, and no more.",
+    "Iron that keeps a flux, or lags behind its current, in the same way at every place.",
+    "Time is the controller's: a clock that is fast by 1e-4 makes fluxes smaller by that share.",
+    "An encoder along that is off within its travel by more than its pitch: 1 µm at one place is 0.007 % of the overlap.",
+)
