@@ -7,29 +7,32 @@ from collections.abc import Mapping
 from typing import Final
 
 from bench.rigfile import RigFile
-from bench.rigfile.binding import MODES, Binding
+from bench.rigfile.binding import LEVITATION_MODES, STAGE_MODES, Binding
 
-FAULTS: Final = ("LEVITATION_LOST", "OVERCURRENT", "OVERSPEED", "HEARTBEAT_LOST", "SENSOR", "LIFT_TIMEOUT")
+FAULTS: Final = ("LEVITATION_LOST", "OVERCURRENT", "OVERSPEED", "HEARTBEAT_LOST", "SENSOR", "LIFT_TIMEOUT", "STROKE",
+                 "OVERTEMPERATURE")  # fmt: skip
 """What the simulated controller latches."""
 
 NEAREST: Final[Mapping[str, tuple[str, ...]]] = {
     "LIFTING": ("READY", "LEVITATED"), "LANDING": ("LEVITATED", "READY"), "SPINNING": ("LEVITATED",),
     "COASTING": ("SPINNING", "LEVITATED"), "READY": ("OFF",), "OFF": ("READY",), "FAULT": ("OFF",), "LEVITATED": ("SPINNING",),
+    "HOMING": ("READY",), "HOLDING": ("MOVING",), "MOVING": ("HOLDING",), "STOPPING": ("MOVING", "HOLDING"),
 }  # fmt: skip
 """For a mode that no state of the DBC means: the mode that a movement comes from, until it has ended; and what holds the
 rotor as this one does. So LEVITATED is never told before the rotor stands, nor READY before it lies."""
 
 
 def state_codes(binding: Binding, choices: Mapping[int, str]) -> dict[str, int]:
-    """The code that tells each of MODES: of several states that mean it the one with the lowest number, of none the nearest
-    mode's (NEAREST), and where that has none either the lowest code."""
+    """The code that tells each mode of what levitates, or of a stage: of several states that mean it the one with the lowest
+    number, of none the nearest mode's (NEAREST), and where that has none either the lowest code."""
     told: dict[str, int] = {}
     for code in sorted(choices):
         mode = binding.mode(choices[code])
         if mode is not None:
             told.setdefault(mode, code)
     lowest = min(told.values(), default=0)
-    near = {m: next((told[n] for n in NEAREST[m] if n in told), lowest) for m in MODES if m not in told}
+    modes = STAGE_MODES if "HOLDING" in told else LEVITATION_MODES
+    near = {m: next((told[n] for n in NEAREST.get(m, ()) if n in told), lowest) for m in modes if m not in told}
     return told | near
 
 
