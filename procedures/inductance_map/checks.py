@@ -82,7 +82,7 @@ def _henry(t: Taken, name: str) -> float:
 
 
 def of_pulses(taken: Sequence[Taken], rig: RigFile, plan: Plan) -> Iterator[Finding]:
-    """Pulses that are not what they should be: too weak, too low, with other phases, with flux that is left."""
+    """Pulses that are not what they should be: too weak, too low, with other phases."""
     some = phases(rig)
     found = {p.name: [pulse for t in taken if (pulse := t.pulses[p.name]) is not None] for p in some}
     volts = {name: float(np.median([p.highest for p in each])) for name, each in found.items()}
@@ -96,11 +96,6 @@ def of_pulses(taken: Sequence[Taken], rig: RigFile, plan: Plan) -> Iterator[Find
         if amperes[name] < REACHED * most:
             text = f"its pulses come to {amperes[name]:.3g} A, those of the others to {most:.3g} A: less is seen of saturation."
             yield Finding("current-not-reached", text, name, Effect.INDETERMINATE, (*concerned, "saturation"))
-        apart = max(found[name], key=lambda p: abs(p.left))
-        if abs(apart.left) > plan.max_left:
-            text = (f"a pulse leaves {apart.left:+.1%} of its flux: remanence, another time of u than of i, or a resistance that "
-                    "is not that of the flanks.")  # fmt: skip
-            yield Finding("flux-left", text, name, Effect.INDETERMINATE)
     other = max(((s.other, f"{name}, {t.place.name}") for t in taken for name, s in t.shots.items()), default=(0.0, ""))
     if other[0] > plan.max_other_A:
         text = f"another phase carried {other[0]:.3g} A: its amplifier is closed, and the phases' coupling is in the flux."
@@ -111,6 +106,12 @@ def of_results(r: Result, rig: RigFile, plan: Plan) -> Iterator[Finding]:
     """A lock that gives way, phases that saturate apart, what the formula lacks, numbers that the pulses do not part."""
     yield from _lock(r, rig, plan)
     yield from _saturation(r, rig)
+    for k, p in enumerate(r.phases):
+        up, down = fit.flanks(r.found, r.rows, k)
+        if abs(up - down) > plan.max_apart:
+            text = (f"fluxes on the way up are {up - down:+.1%} more than on the way down: hysteresis, u and i of different "
+                    "times, or a resistance that is not that of the flanks.")  # fmt: skip
+            yield Finding("flanks-apart", text, p.name, Effect.INDETERMINATE)
     of = left(r)
     yield from _formula(of, r, plan)
     matrix, u = fit.correlations(r.found), np.sqrt(np.diag(r.found.covariance))

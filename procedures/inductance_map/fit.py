@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.errors import AnalysisError
-from procedures.inductance_map.model import MAP, PHASES, Array, Rows, Terms, flux, inductance
+from procedures.inductance_map.model import MAP, PHASES, Array, Rows, Terms, flux, inductance, places
 from procedures.shared.leastsquares import nonlinear
 
 FLOOR = 2e-6  # Wb: what counts of readings leave of a flux
@@ -107,13 +107,29 @@ def _by_pulses(by: Array, rows: Rows, left: Array, free: int) -> Array:
 
 def by_place(found: Found, rows: Rows) -> tuple[Array, Array]:
     """G (places, 6) of the fit, and what the pulses' fluxes have beyond it, as a share of it, mean over each pulse's flanks."""
-    g, _, _ = inductance(found.terms, rows)
+    g, _, _ = at_places(found, rows)
     per = rows.place * PHASES + rows.phase
     weight = rows.flux**2
     fit = rows.flux - found.residuals
     count = g.size
     share = np.bincount(per, found.residuals * fit, count) / np.maximum(np.bincount(per, weight, count), 1e-30)
     return g, share.reshape(g.shape)
+
+
+def at_places(found: Found, rows: Rows) -> tuple[Array, Array, Array]:
+    """G H and its slopes around and along (places, 6), where the shaft stands without currents."""
+    x, angle = (np.repeat(v[:, None], PHASES, axis=1) for v in places(found.terms, rows))
+    return inductance(found.terms, rows, x, angle, np.broadcast_to(np.arange(PHASES), x.shape))
+
+
+def flanks(found: Found, rows: Rows, phase: int) -> tuple[float, float]:
+    """What fluxes of a phase have beyond the fit on their way up and down, as a share."""
+    fit = rows.flux - found.residuals
+    out = []
+    for down in (0.0, 1.0):
+        some = (rows.phase == phase) & (rows.down == down)
+        out.append(float((found.residuals * fit)[some].sum() / max(float((fit[some] ** 2).sum()), 1e-30)))
+    return out[0], out[1]
 
 
 def correlations(found: Found) -> Array:

@@ -6,7 +6,7 @@
 
 d is the angle from where the phase is aligned, N the poles of the rotor, `quarter` half a pole's pitch, where phases are
 unaligned; a is the angle itself, and p, q what turns once with it. A lock that gives way by c rad for a N m lets the rotor turn by
-c T, T = dG/da Q(i), Q = i_s^2 (sqrt(1 + (i/i_s)^2) - 1): the flux grows by dG/da c T i/sqrt(1 + (i/i_s)^2), and likewise along.
+c T, T = dG/da Q(i), Q = i_s^2 (sqrt(1 + (i/i_s)^2) - 1), and likewise along: G is that of where it comes to.
 
 Each phase has its own L_l and i_s. With readings g_i i and g_u u of current and voltage (g_u psi follows, `pulses`) L_l g_u/g_i,
 gain g_u/g_i and g_i i_s fit as well as the true ones: gains of readings cost the fit nothing, and are put right after it.
@@ -24,6 +24,7 @@ Index = npt.NDArray[np.intp]
 MAP = ("slope", "unaligned", "c2", "c3", "length", "overlap", "fringe", "zero_1", "zero_2", "centre", "cosine", "sine", "give",
        "give_x")  # fmt: skip
 PHASES = 6
+YIELDS = 2
 EACH = ("gain", "leakage", "saturation", "offset_up", "offset_down", "offset_u")
 """By phase: share of the slope, L_l, i_s; offsets of a current's reading up and down, and of a voltage's."""
 
@@ -110,31 +111,39 @@ def advance(o: Array, length: float, fringe: float) -> Array:
     return out
 
 
-def inductance(t: Array, rows: Rows) -> tuple[Array, Array, Array]:
-    """G (places, 6) H, dG/da and dG/dx, by the terms."""
-    m, at = dict(zip(MAP, t, strict=False)), Terms(len(rows.x))
+def places(t: Array, rows: Rows) -> tuple[Array, Array]:
+    """True x m and angle rad of each place, by what the encoders read and are off."""
+    at = Terms(len(rows.x))
     c, s = t[at.once]
     turned = rows.angle + c * np.cos(rows.angle) + s * np.sin(rows.angle) + t[at.off]
-    zero = np.where(rows.stator == 0, m["zero_1"], m["zero_2"])
-    d = turned[:, None] - rows.aligned - zero
-    x = (rows.x * t[at.scale] + t[at.along])[:, None]
-    o = m["overlap"] + rows.side * (x - m["centre"])
+    return rows.x * t[at.scale] + t[at.along], turned
+
+
+def inductance(t: Array, rows: Rows, x: Array, angle: Array, k: Index) -> tuple[Array, Array, Array]:
+    """G H of phases `k` at places `x` m and `angle` rad (which go with `k`), dG/da and dG/dx, by the terms."""
+    m, at = dict(zip(MAP, t, strict=False)), Terms(len(rows.x))
+    side = rows.side[k]
+    d = angle - rows.aligned[k] - np.where(rows.stator[k] == 0, m["zero_1"], m["zero_2"])
+    o = m["overlap"] + side * (x - m["centre"])
     over, rise = overlapped(o, m["length"], m["fringe"]), advance(o, m["length"], m["fringe"])
     lam, bend = angular(d, m["unaligned"], m["c2"], m["c3"], rows.poles)
-    even = 1 + m["cosine"] * np.cos(turned)[:, None] + m["sine"] * np.sin(turned)[:, None]
-    turn = m["sine"] * np.cos(turned)[:, None] - m["cosine"] * np.sin(turned)[:, None]
-    whole = m["slope"] * t[at.each("gain")]
-    return whole * over * lam * even, whole * over * (bend * even + lam * turn), whole * rows.side * rise * lam * even
+    c, s = np.cos(angle), np.sin(angle)
+    even, turn = 1 + m["cosine"] * c + m["sine"] * s, m["sine"] * c - m["cosine"] * s
+    whole = m["slope"] * t[at.each("gain")][k]
+    return whole * over * lam * even, whole * over * (bend * even + lam * turn), whole * side * rise * lam * even
 
 
 def flux(t: Array, rows: Rows) -> Array:
     """Of every sample as it is read, Wb (n,)."""
     m, at, k = dict(zip(MAP, t, strict=False)), Terms(len(rows.x)), rows.phase
-    g, around, along = (values[rows.place, k] for values in inductance(t, rows))
     up, down = t[at.each("offset_up")][k], t[at.each("offset_down")][k]
     i, down_too = rows.current - np.where(rows.down > 0, down, up), np.where(rows.down > 0, down, 0.0)
     root = np.sqrt(1 + (i / t[at.each("saturation")][k]) ** 2)
-    yielded = (m["give"] * around**2 + m["give_x"] * along**2) * i**2 / (1 + root)
-    psi = t[at.each("leakage")][k] * i + (g + yielded) * i / root
+    q = i**2 / (1 + root)
+    x, angle = (values[rows.place] for values in places(t, rows))
+    g, around, along = inductance(t, rows, x, angle, k)
+    for _ in range(YIELDS):  # the lock gives way to where force and torque are those of that place
+        g, around, along = inductance(t, rows, x + m["give_x"] * along * q, angle + m["give"] * around * q, k)
+    psi = t[at.each("leakage")][k] * i + g * i / root
     out: Array = psi + t[at.each("offset_u")][k] * rows.late + up * rows.lean + down_too * rows.lag
     return out

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from bench import capture
+from bench.rigfile.capture import rises
 from bench.errors import AnalysisError
 from bench.figures import Shown
 from bench.findings import Effect, Finding, Findings
@@ -18,6 +18,7 @@ from bench.procedure import Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
+from bench.procedure.states import transition
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
@@ -68,11 +69,11 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     assert x is not None
     assert angle is not None
     for place in grid(plan):
-        rig.motion.hold()
+        transition(rig, RigState.HELD)
         rig.motion.move({x.name: place.x, angle.name: place.angle})
         rig.clock.sleep(plan.settle_s)
         rig.operator.mount("lock")
-        rig.motion.let_go()
+        transition(rig, RigState.READY)
         with record.step(PLACE, number=place.number):
             rig.clock.sleep(plan.rest_s)
         try:
@@ -92,7 +93,7 @@ def _pulse(rig: Rig, plan: Plan, place: Place, phase: Phase) -> None:
     rig.motion.write({test.phase: phase.value})
     seconds = BEFORE_S + plan.pulse_s + plan.tail_s
     rig.capture.arm(captured(rig.file, phase), seconds=seconds, before_s=BEFORE_S, rate_hz=plan.rate_hz,
-                    trigger=capture.rises(phase.voltage, plan.trigger_V))  # fmt: skip
+                    trigger=rises(phase.voltage, plan.trigger_V))  # fmt: skip
     rig.clock.sleep(2 * BEFORE_S)
     rig.motion.write({test.pulse: plan.pulse_s})
     rig.capture.wait(seconds + 5.0)

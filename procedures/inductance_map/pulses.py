@@ -11,7 +11,7 @@ voltage and g i + o of the current give the same R g_u/g at the held end, and, w
     down:  psi read = g_u psi - b (t - integral of i/i_end) + R (o_down t - o integral of i/i_end) + L o_down
 
 (L o_down: what is read at the end is taken for a current that has its flux), so that gains cost no shape, and offsets little: R t is
-small against an inductance. `late`, `lean` and `lag` below are the factors of b, o and o_down.
+small against an inductance. What both read before the pulse is taken off; what is left of offsets is that of a bridge that is on. `late`, `lean` and `lag` below are the factors of b, o and o_down.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ HELD = 0.4  # share of the pulse, at its end, that tells the resistance
 QUIET = 0.001  # of the current's end: less than that is none
 LOW, HIGH = 0.05, 0.97  # of the current's end: what of the flanks is taken
 AFTER = 10  # samples: of a current that dies away
+REST = 10  # samples before a pulse that tell what readings are off
 LEAST_A = 0.05  # of a pulse
 
 
@@ -43,8 +44,7 @@ class Flank:
 
 @dataclass(frozen=True)
 class Pulse:
-    """What one pulse shows: current, voltage and resistance of its end, the greatest voltage up, both flanks; what it leaves of
-    its flux, as a share of the greatest; by what share R grows in a second; noise of the current's reading, A."""
+    """What one pulse shows: current, voltage and resistance of its end, the greatest voltage up, both flanks; by what share R grows in a second; noise of the current's reading, A."""
 
     current: float
     voltage: float
@@ -52,7 +52,6 @@ class Pulse:
     highest: float
     up: Flank
     down: Flank
-    left: float
     warming: float
     noise: float
 
@@ -60,8 +59,11 @@ class Pulse:
 def read(u: Array, i: Array, step_s: float, warming: float | None = None) -> Pulse | None:
     """Of a capture: `u` (n,) V over the step that ends at each sample, `i` (n,) A. None where there is no pulse. `warming` of R
     as the mean of pulses has it; None: as this pulse shows it, which noise makes uncertain."""
+    if len(i) < 20 or not (np.isfinite(u).all() and np.isfinite(i).all()):
+        return None
+    u, i = _from_rest(u, i)
     size = np.abs(i)
-    if len(i) < 20 or not (np.isfinite(u).all() and np.isfinite(i).all()) or size.max() < LEAST_A:
+    if size.max() < LEAST_A:
         return None
     first, last = _held(u, size)
     if last - first < 4:
@@ -84,10 +86,15 @@ def read(u: Array, i: Array, step_s: float, warming: float | None = None) -> Pul
     henry, rest = _inductance(rising), slice(stop - AFTER // 2, stop + 1)
     final = float((psi[rest] - henry * i[rest]).mean())
     falling = flank(down, psi - final, left - until, -ohm * left, ohm * until + henry)
-    top = float(psi[first:last].mean() - psi[start])
     highest = float(np.abs(u[start:first]).max())
     noise = float(np.diff(i[first:last]).std()) / math.sqrt(2)
-    return Pulse(end, volts, ohm, highest, rising, falling, (final - float(psi[start])) / (top or 1e-12), rate, noise)
+    return Pulse(end, volts, ohm, highest, rising, falling, rate, noise)
+
+
+def _from_rest(u: Array, i: Array) -> tuple[Array, Array]:
+    """Less what both read before the pulse, when there is neither voltage nor current."""
+    before = int(np.argmax(np.abs(u) > 0.3 * np.abs(u).max())) - 1
+    return (u, i) if before < REST else (u - u[:before].mean(), i - i[:before].mean())
 
 
 def _resistance(u: Array, i: Array, heat: Array, held: tuple[int, int], warming: float | None) -> tuple[float, float, Array]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from procedures.inductance_map import fit
 from procedures.inductance_map.estimates import Result
-from procedures.inductance_map.model import MAP, Array, Terms, inductance, overlapped
+from procedures.inductance_map.model import MAP, Array, Terms, overlapped, places
 
 ORDERS = (1, 2, 3, 4, 5, 6)
 """Of the rotor's poles; cosines of the first three are the formula's."""
@@ -32,10 +32,10 @@ def left(r: Result) -> Left:
     m = dict(zip(MAP, t, strict=False))
     g, share = fit.by_place(r.found, r.rows)
     zero = np.where(r.rows.stator == 0, m["zero_1"], m["zero_2"])
-    angle = r.rows.angle + t[at.off]
+    along, angle = places(t, r.rows)
     period = 2 * np.pi / r.rows.poles
     d = (angle[:, None] - r.rows.aligned - zero + period / 2) % period - period / 2
-    x = (r.rows.x + t[at.along])[:, None]
+    x = along[:, None]
     over = overlapped(m["overlap"] + r.rows.side * (x - m["centre"]), m["length"], m["fringe"])
     per = t[at.each("gain")] * over
     return Left(d, over, g / per, g * share / per, float(m["slope"]))
@@ -69,7 +69,7 @@ def by_depth(of: Left, r: Result) -> list[tuple[float, float, float]]:
 
 def torques(r: Result) -> Array:
     """Torque of each phase at the current of its pulse's end, N m (places, 6)."""
-    _, around, _ = inductance(r.found.terms, r.rows)
+    _, around, _ = fit.at_places(r.found, r.rows)
     at = Terms(len(r.rows.x))
     most = np.array([max((abs(p.current) for t in r.taken if (p := t.pulses.get(k.name)) is not None), default=0.0) for k in r.phases])
     root = np.sqrt(1 + (most / r.found.terms[at.each("saturation")]) ** 2)
