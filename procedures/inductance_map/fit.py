@@ -71,7 +71,7 @@ def fitted(rows: Rows, first: Array, known: Sequence[Known]) -> Found:
     said, u = np.array([k.value for k in known]), np.array([k.u for k in known])
     at, n = Terms(len(rows.x)), len(rows.flux)
     observed = np.concatenate([rows.flux, said, [1.0]])
-    base = np.sqrt(FLOOR**2 + (SHARE * rows.flux) ** 2 + (rows.noise * rows.flux / rows.current) ** 2)
+    base = np.sqrt(FLOOR**2 + (SHARE * rows.flux) ** 2 + (rows.noise * _henries(rows)) ** 2)
 
     def model(t: Array) -> Array:
         return np.concatenate([flux(t, rows), t[numbers], [t[at.each("gain")].mean()]])
@@ -90,6 +90,14 @@ def fitted(rows: Rows, first: Array, known: Sequence[Known]) -> Found:
     scatter = _by_pulses(by[:, :n], rows, rows.flux - flux(terms, rows), at.count - len(known))
     return Found(terms, found.covariance, by[:, n : n + len(known)], scatter, float(free), rows.flux - flux(terms, rows),
                  weight[:n], size)  # fmt: skip
+
+
+def _henries(rows: Rows) -> Array:
+    """Flux per ampere of each sample's pulse (n,): of the pulse, so that a sample's noise is not in its own weight."""
+    pulse = rows.place * PHASES + rows.phase
+    each = np.bincount(pulse, rows.flux * rows.current) / np.maximum(np.bincount(pulse, rows.current**2), 1e-30)
+    out: Array = each[pulse]
+    return out
 
 
 def _by_pulses(by: Array, rows: Rows, left: Array, free: int) -> Array:

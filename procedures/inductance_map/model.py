@@ -6,7 +6,8 @@
 
 d is the angle from where the phase is aligned, N the poles of the rotor, `quarter` half a pole's pitch, where phases are
 unaligned; a is the angle itself, and p, q what turns once with it. A lock that gives way by c rad for a N m lets the rotor turn by
-c T, T = dG/da Q(i), Q = i_s^2 (sqrt(1 + (i/i_s)^2) - 1), and likewise along: G is that of where it comes to.
+c T, T = dG/da Q(i), Q = i_s^2 (sqrt(1 + (i/i_s)^2) - 1), and likewise along. G is that of where
+it comes to by the current of the sample before: it takes a while.
 
 Each phase has its own L_l and i_s. With readings g_i i and g_u u of current and voltage (g_u psi follows, `pulses`) L_l g_u/g_i,
 gain g_u/g_i and g_i i_s fit as well as the true ones: gains of readings cost the fit nothing, and are put right after it.
@@ -31,7 +32,8 @@ EACH = ("gain", "leakage", "saturation", "offset_up", "offset_down", "offset_u")
 
 @dataclass(frozen=True)
 class Rows:
-    """Every sample of every flank (n,): `phase`, `place` (numbers), `down` (1 on the way down), current and flux as read,
+    """Every sample of every flank (n,): `phase`, `place` (numbers), `down` (1 on the way down), current and flux as read, the
+    current a sample `before`,
     factors of offsets; of each place (m,) the readings `x` m and `angle` rad; of each phase (6,) `side` (-1, 1: towards which
     its stator draws), `stator` (0, 1), `aligned` rad; the rotor's `poles`; `noise` of a current, A."""
 
@@ -39,6 +41,7 @@ class Rows:
     place: Index
     down: Array
     current: Array
+    before: Array
     flux: Array
     late: Array
     lean: Array
@@ -138,8 +141,9 @@ def flux(t: Array, rows: Rows) -> Array:
     m, at, k = dict(zip(MAP, t, strict=False)), Terms(len(rows.x)), rows.phase
     up, down = t[at.each("offset_up")][k], t[at.each("offset_down")][k]
     i, down_too = rows.current - np.where(rows.down > 0, down, up), np.where(rows.down > 0, down, 0.0)
-    root = np.sqrt(1 + (i / t[at.each("saturation")][k]) ** 2)
-    q = i**2 / (1 + root)
+    saturation = t[at.each("saturation")][k]
+    root, earlier = np.sqrt(1 + (i / saturation) ** 2), rows.before - np.where(rows.down > 0, down, up)
+    q = earlier**2 / (1 + np.sqrt(1 + (earlier / saturation) ** 2))
     x, angle = (values[rows.place] for values in places(t, rows))
     g, around, along = inductance(t, rows, x, angle, k)
     for _ in range(YIELDS):  # the lock gives way to where force and torque are those of that place

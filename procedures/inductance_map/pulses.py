@@ -33,9 +33,11 @@ LEAST_A = 0.05  # of a pulse
 
 @dataclass(frozen=True)
 class Flank:
-    """At each sample (n,) of a flank: current A and flux Wb as they are read, and the factors of the offsets, s and Ohm s."""
+    """At each sample (n,) of a flank: current A and flux Wb as they are read, the
+    current a sample before, and the factors of the offsets, s and Ohm s."""
 
     current: Array
+    before: Array
     flux: Array
     late: Array
     lean: Array
@@ -44,7 +46,8 @@ class Flank:
 
 @dataclass(frozen=True)
 class Pulse:
-    """What one pulse shows: current, voltage and resistance of its end, the greatest voltage up, both flanks; by what share R grows in a second; noise of the current's reading, A."""
+    """What one pulse shows: current, voltage and resistance of its end, the greatest voltage up, both flanks; by what
+    share R grows in a second; noise of the current's reading, A."""
 
     current: float
     voltage: float
@@ -78,7 +81,7 @@ def read(u: Array, i: Array, step_s: float, warming: float | None = None) -> Pul
 
     def flank(index: npt.NDArray[np.intp], flux: Array, late: Array, lean: Array, lag: Array) -> Flank:
         kept = index[(size[index] > LOW * abs(end)) & (size[index] < HIGH * abs(end))]
-        return Flank(i[kept], flux[kept], late[kept], lean[kept], lag[kept])
+        return Flank(i[kept], i[np.maximum(kept - 1, 0)], flux[kept], late[kept], lean[kept], lag[kept])
 
     since, gone = time - time[start] - step_s / 2, share - share[start]  # an offset is in half of the first step's mean
     until, left = time[stop] - time, share[stop] - share

@@ -93,7 +93,7 @@ def with_pulses(taken: Sequence[Taken]) -> list[Taken]:
 
 def rows(taken: Sequence[Taken], rig: RigFile) -> Rows:
     """Every sample of every flank."""
-    parts: dict[str, list[Array]] = {n: [] for n in ("phase", "place", "down", "current", "flux", "late", "lean", "lag")}
+    parts: dict[str, list[Array]] = {n: [] for n in ("phase", "place", "down", "current", "before", "flux", "late", "lean", "lag")}
     some, noise = phases(rig), []
     for m, t in enumerate(taken):
         for k, phase in enumerate(some):
@@ -105,7 +105,7 @@ def rows(taken: Sequence[Taken], rig: RigFile) -> Rows:
                 n = len(flank.current)
                 for name, value in (("phase", k), ("place", m), ("down", down)):
                     parts[name].append(np.full(n, value))
-                for name in ("current", "flux", "late", "lean", "lag"):
+                for name in ("current", "before", "flux", "late", "lean", "lag"):
                     parts[name].append(getattr(flank, name))
     whole = {name: np.concatenate(values) for name, values in parts.items()}
     return Rows(
