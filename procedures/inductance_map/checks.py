@@ -68,7 +68,7 @@ def of_order(taken: Sequence[Taken], rig: RigFile) -> Iterator[Finding]:
         if abs(off) > ALIGNED:
             text = (f"it is aligned {math.degrees(off):+.3g}° from where its place in the stator says: phases are exchanged, or "
                     "the encoder's zero is another one.")  # fmt: skip
-            yield Finding("phases-exchanged", text, p.name, Effect.ERROR)
+            yield Finding("phase-elsewhere", text, p.name, Effect.ERROR)
         elif np.corrcoef(henry, p.side * x)[0, 1] < -0.3:
             text = "its inductance falls where its stator should be deeper in: stators are exchanged, or x counts the other way."
             yield Finding("stators-exchanged", text, p.name, Effect.ERROR)

@@ -230,3 +230,8 @@ INDUCTANCE_MAP = (
     "Time is the controller's: a clock that is fast by 1e-4 makes fluxes smaller by that share.",
     "An encoder along that is off within its travel by more than its pitch: 1 µm at one place is 0.007 % of the overlap.",
 )
+MAP_ZERO = (
+    "Friction that differs by the way the shaft turns: a tenth more one way moves the zero by a tenth of the band.",
+    "Inductance that grows to one side over the width of a tooth: the shaft comes to rest where it is greatest, which is what is "
+    "told.",
+)
