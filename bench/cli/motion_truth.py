@@ -21,6 +21,7 @@ from bench.cli.truths import (
     motor,
     one_axis,
     pull,
+    reluctance,
     rotor,
     turning,
     weights,
@@ -75,4 +76,6 @@ TRUTHS: Mapping[str, Callable[[Any], Found]] = {
     "coil-map": coils.shares,
     "gate-margin": gate.margins,
     "bearing-constant": weights.constants,
+    "map-zero": reluctance.zeros,
+    "inductance-map": reluctance.inductances,
 }

@@ -87,7 +87,7 @@ def fitted(rows: Rows, first: Array, known: Sequence[Known]) -> Found:
             raise AnalysisError("residuals are not finite")
     j = found.jacobian / weight[:, None]
     by = found.covariance @ j.T / weight  # what each observation does to each term
-    scatter = _by_pulses(by[:, :n], rows, rows.flux - flux(terms, rows), at.count - len(known))
+    scatter = _by_pulses(by[:, :n], found.jacobian[:n], rows, rows.flux - flux(terms, rows))
     return Found(terms, found.covariance, by[:, n : n + len(known)], scatter, float(free), rows.flux - flux(terms, rows),
                  weight[:n], size)  # fmt: skip
 
@@ -100,16 +100,18 @@ def _henries(rows: Rows) -> Array:
     return out
 
 
-def _by_pulses(by: Array, rows: Rows, left: Array, free: int) -> Array:
+def _by_pulses(by: Array, jacobian: Array, rows: Rows, left: Array) -> Array:
     """Covariance (terms, terms) that residuals make. Those of one pulse are no repeats of each other: a flux is an integral, and
-    what is wrong with it is wrong on both flanks. So what each pulse does to the terms is taken whole (Liang and Zeger, Biometrika
-    73, 13 (1986)), of `free` terms that have no certificate."""
+    what is wrong with it is wrong on both flanks. So what each pulse does to the terms is taken whole, by the residuals it would
+    have if it had not been fitted, (1 - H)^-1 of those it has (Bell and McCaffrey, Survey Methodology 28, 169 (2002), their CR3:
+    the jackknife over pulses)."""
     pulse = rows.place * PHASES + rows.phase
-    count = int(pulse.max()) + 1
-    each = np.zeros((count, len(by)))
-    np.add.at(each, pulse, (by * left).T)
-    used = np.unique(pulse).size
-    out: Array = each.T @ each * used / max(used - free, 1)
+    out = np.zeros((len(by), len(by)))
+    for one in np.unique(pulse):
+        some = np.flatnonzero(pulse == one)
+        own = np.eye(len(some)) - jacobian[some] @ by[:, some]
+        moved = by[:, some] @ np.linalg.solve(own, left[some])
+        out += np.outer(moved, moved)
     return out
 
 

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from procedures.inductance_map.plan import Plan
 
 GOLDEN = (math.sqrt(5) - 1) / 2
-"""Multiples of it fill a turn, and each quarter of it, evenly: however many there are, none repeats another."""
-TAU = 2 * math.pi
+"""Multiples of it fill half a turn, and each quarter, evenly: however many there are, none repeats another."""
 
 
 @dataclass(frozen=True)
@@ -27,8 +26,10 @@ class Place:
 
 
 def grid(plan: Plan) -> tuple[Place, ...]:
-    """Position by position; angles jump to and fro over the turn, so that they are not all come to from one side."""
+    """Position by position; angles are in one half of the turn and in the other in turn. So each is come to from the other side
+    than the one before, and what a loop leaves of the count at which it comes to rest is none in the mean."""
     out = []
     for k in range(len(plan.positions_m) * plan.angles_per_position):
-        out.append(Place(k, plan.positions_m[k // plan.angles_per_position], TAU * ((k + 1) * GOLDEN % 1.0)))
+        angle = math.pi * ((k // 2 + 1) * GOLDEN % 1.0 + k % 2)
+        out.append(Place(k, plan.positions_m[k // plan.angles_per_position], angle))
     return tuple(out)
