@@ -30,6 +30,6 @@ def grid(plan: Plan) -> tuple[Place, ...]:
     than the one before, and what a loop leaves of the count at which it comes to rest is none in the mean."""
     out = []
     for k in range(len(plan.positions_m) * plan.angles_per_position):
-        angle = math.pi * ((k // 2 + 1) * GOLDEN % 1.0 + k % 2)
+        angle = math.pi * ((k + 1) * GOLDEN % 1.0 + k % 2)
         out.append(Place(k, plan.positions_m[k // plan.angles_per_position], angle))
     return tuple(out)

@@ -85,7 +85,7 @@ def read(u: Array, i: Array, step_s: float, warming: float | None = None) -> Pul
 
     since, gone = time - time[start] - step_s / 2, share - share[start]  # an offset is in half of the first step's mean
     until, left = time[stop] - time, share[stop] - share
-    rising = flank(up, psi - psi[start], since - gone, ohm * (gone - since), np.zeros(len(i)))
+    rising = flank(up, psi - psi[start], since + step_s / 2 - gone, ohm * (gone - since), np.zeros(len(i)))
     henry, rest = _inductance(rising), slice(stop - AFTER // 2, stop + 1)
     final = float((psi[rest] - henry * i[rest]).mean())
     falling = flank(down, psi - final, left - until, -ohm * left, ohm * until + henry)
