@@ -28,7 +28,7 @@ FEWEST = 8  # places
 def of_signals(taken: Sequence[Taken], rig: RigFile, plan: Plan) -> Iterator[Finding]:
     """Nothing locked or captured, another state, no pulses, readings with a wrong sign."""
     if len(taken) < FEWEST:
-        yield Finding("too-few-places", f"found {len(taken)} places; expected {FEWEST} or more (was the run stopped early?)", "",
+        yield Finding("too-few-places", f"found {len(taken)} places; expected {FEWEST} (was the run stopped early?)", "",
                       Effect.ERROR)  # fmt: skip
         return
     some = phases(rig)
@@ -38,7 +38,9 @@ def of_signals(taken: Sequence[Taken], rig: RigFile, plan: Plan) -> Iterator[Fin
             yield Finding("not-let-go", text, t.place.name, Effect.ERROR)
             return
         if missing := [p.name for p in some if p.name not in t.shots]:
-            yield Finding("pulse-not-captured", f"of {', '.join(missing)} there is no capture.", t.place.name, Effect.ERROR)
+            yield Finding(
+                "pulse-not-captured", f"of {', '.join(missing)} there is no capture.", t.place.name, Effect.ERROR
+            )
             return
         if missing := [p.name for p in some if t.pulses.get(p.name) is None]:
             text = f"of {', '.join(missing)} there is no current that a pulse makes."
@@ -66,11 +68,11 @@ def of_order(taken: Sequence[Taken], rig: RigFile) -> Iterator[Finding]:
         terms, *_ = np.linalg.lstsq(design, henry, rcond=None)
         off = (math.atan2(terms[2], terms[1]) / n - p.aligned + math.pi / n) % (2 * math.pi / n) - math.pi / n
         if abs(off) > ALIGNED:
-            text = (f"it is aligned {math.degrees(off):+.3g}° from where its place in the stator says: phases are exchanged, or "
+            text = (f"it is aligned {math.degrees(off):+.3g}° from where its stator has it: phases are exchanged, or "
                     "the encoder's zero is another one.")  # fmt: skip
             yield Finding("phase-elsewhere", text, p.name, Effect.ERROR)
         elif np.corrcoef(henry, p.side * x)[0, 1] < -0.3:
-            text = "its inductance falls where its stator should be deeper in: stators are exchanged, or x counts the other way."
+            text = "its inductance falls where the mover should be deeper in: stators are exchanged, or x counts backwards."
             yield Finding("stators-exchanged", text, p.name, Effect.ERROR)
 
 
@@ -98,7 +100,9 @@ def of_pulses(taken: Sequence[Taken], rig: RigFile, plan: Plan) -> Iterator[Find
             yield Finding("current-not-reached", text, name, Effect.INDETERMINATE, (*concerned, "saturation"))
     other = max(((s.other, f"{name}, {t.place.name}") for t in taken for name, s in t.shots.items()), default=(0.0, ""))
     if other[0] > plan.max_other_A:
-        text = f"another phase carried {other[0]:.3g} A: its amplifier is closed, and the phases' coupling is in the flux."
+        text = (
+            f"another phase carried {other[0]:.3g} A: its amplifier is closed, and the phases' coupling is in the flux."
+        )
         yield Finding("others-carry", text, other[1], Effect.INDETERMINATE)
 
 
@@ -161,5 +165,7 @@ def _formula(of: Left, r: Result, plan: Plan) -> Iterator[Finding]:
             yield Finding("harmonic-seen", text, "angle", Effect.NOTE)
     overlap, size, u = max(by_depth(of, r), key=lambda d: abs(d[1]))
     if abs(size) > plan.max_residual and abs(size) > APART * u:
-        text = f"with {overlap * 1e3:.3g} mm in a stator, fluxes have {size:+.2%} of the greatest one beyond the formula."
+        text = (
+            f"with {overlap * 1e3:.3g} mm in a stator, fluxes have {size:+.2%} of the greatest one beyond the formula."
+        )
         yield Finding("fringe-left", text, "overlap", Effect.INDETERMINATE, ("fringe", "length", "overlap", "centre"))

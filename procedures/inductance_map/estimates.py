@@ -1,4 +1,5 @@
-"""The map's numbers with influences: certificates by what each does to the fit, gains of readings after it, scatter of pulses."""
+"""The map's numbers with influences: certificates by what each does to the fit, gains of readings after it, scatter of
+pulses."""
 
 from __future__ import annotations
 
@@ -95,7 +96,7 @@ def estimates(found: Found, known: Sequence[Known], of: Rows, rig: RigFile, some
             out["uneven", name] = _in(term[j], "uneven")
         elif name != "slope":
             out[name, ""] = _in(term[j], name)
-    for k, phase in enumerate(some):
+    for phase in some:
         out["gain", phase.name] = _in(each[phase.name] / slope, "gain")
     leakage = [term[at.each("leakage").start + k] * factor[k] for k in range(PHASES)]
     saturation = [term[at.each("saturation").start + k] / certified_gain(rig, p.current) for k, p in enumerate(some)]
@@ -114,7 +115,9 @@ def _resistance(phase: Phase, factor: Estimate, taken: Sequence[Taken]) -> Estim
     """u/i of the held ends, by true volts and amperes; it warms meanwhile, which is in the scatter."""
     each = np.array([p.resistance for t in taken if (p := t.pulses.get(phase.name)) is not None])
     u = float(each.std(ddof=1)) / math.sqrt(len(each))
-    scatter = Influence(f"scatter/resistance/{phase.name}", "scatter of the pulses", u, "Ohm", "A", "normal", len(each) - 1.0)
+    scatter = Influence(
+        f"scatter/resistance/{phase.name}", "scatter of the pulses", u, "Ohm", "A", "normal", len(each) - 1.0
+    )
     return _in(Estimate.exact(float(each.mean())) * factor, "resistance") + Estimate.of(0.0, scatter)
 
 
@@ -150,5 +153,8 @@ def _parts(covariance: Array, identity: str, name: str, kind: str, dof: float) -
     u = np.sqrt(np.diag(covariance))
     scale = np.where(u > 0, u, 1.0)
     root = np.linalg.cholesky(covariance / np.outer(scale, scale) + 1e-10 * np.eye(len(u)))
-    one = [Influence(f"{identity}/{k + 1}", name, 1.0, "1", "A" if kind == "A" else "B", "normal", dof) for k in range(len(u))]
+    one = [
+        Influence(f"{identity}/{k + 1}", name, 1.0, "1", "A" if kind == "A" else "B", "normal", dof)
+        for k in range(len(u))
+    ]
     return [Estimate(0.0, "", {one[k]: float(root[row, k] * u[row]) for k in range(row + 1)}) for row in range(len(u))]

@@ -31,8 +31,15 @@ def _inductance(r: Result) -> Figure:
         at = np.degrees(of.d[:, k])
         points.append(Series(p.name, at, of.fitted[:, k] + of.beyond[:, k], "points"))
         beyond.append(Series(p.name, at, 100 * of.beyond[:, k] / of.aligned, "points"))
-    below = Figure("residuals", "Residuals", "", "angle from the aligned one / °", "beyond the formula / % of aligned", tuple(beyond))
-    caption = ("Inductance per metre of overlap without saturation, over the phase's gain: each pulse, and the formula. What turns "
+    below = Figure(
+        "residuals",
+        "Residuals",
+        "",
+        "angle from the aligned one / °",
+        "beyond the formula / % of aligned",
+        tuple(beyond),
+    )
+    caption = ("Inductance per metre of overlap without saturation, over the phase's gain: pulses and the formula. What turns "
                "once with the angle is in both.")  # fmt: skip
     return Figure("inductance", "Inductance over the angle", caption, "angle from the aligned one / °", "inductance / (H/m)",
                   (*points, Series("formula", np.degrees(d), curve, "line")), below=below)  # fmt: skip
@@ -50,8 +57,13 @@ def _fluxes(r: Result) -> Figure:
         order = np.argsort(r.rows.current[some])
         name = f"{r.phases[k].name}, {math.degrees(of.d[m, k]):.2g}°, {of.overlap[m, k] * 1e3:.3g} mm in: {label}"
         i = r.rows.current[some][order]
-        series += [Series(name, i, 1e3 * r.rows.flux[some][order], "points"), Series("", i, 1e3 * fit[some][order], "faint")]
-    caption = "Flux of two pulses on their way up and down, by u - R i with R of the pulse's own held end; lines are the fit."
+        series += [
+            Series(name, i, 1e3 * r.rows.flux[some][order], "points"),
+            Series("", i, 1e3 * fit[some][order], "faint"),
+        ]
+    caption = (
+        "Flux of two pulses on their way up and down, by u - R i with R of the pulse's own held end; lines are the fit."
+    )
     return Figure("flux", "Flux over current", caption, "current / A", "flux / mWb", tuple(series))
 
 
@@ -59,9 +71,24 @@ def _parameters(r: Result, rig: RigFile) -> Sheet:
     stators = list(dict.fromkeys(p.motor for p in r.phases))
     told, rows = names(stators, [p.name for p in r.phases]), []
     for meaning, quantity in told.items():
-        name = rig.capabilities.model.get(meaning)
+        name = rig.capabilities.model.get(meaning, "")
         estimate = r.estimates.get(tuple(quantity.partition("@")[::2]))  # type: ignore[arg-type]
         if name in rig.parameters and estimate is not None:
-            rows.append((name, f"{rig.parameters[name].default:.6g}", f"{estimate.value:.6g}", f"{2 * estimate.u:.2g}", estimate.unit))
+            rows.append(
+                (
+                    name,
+                    f"{rig.parameters[name].default:.6g}",
+                    f"{estimate.value:.6g}",
+                    f"{2 * estimate.u:.2g}",
+                    estimate.unit,
+                )
+            )
     caption = "The controller's map by default, and the one that was found, in its own units; U is 2 u."
-    return Sheet("parameters", "The controller's map", caption, ("parameter", "by default", "found", "U", "unit"), tuple(rows), (1, 2, 3))
+    return Sheet(
+        "parameters",
+        "The controller's map",
+        caption,
+        ("parameter", "by default", "found", "U", "unit"),
+        tuple(rows),
+        (1, 2, 3),
+    )

@@ -1,9 +1,9 @@
 """Weighted least squares of the map's terms over all flanks, with what certificates say as observations of their own.
 
-Unknown are the map, what each phase has (the mean of the gains is one), what encoders are off (once a turn, and at each place by
-less than half a count), and offsets of readings. Those of the last two kinds have a certificate: its value is an observation with
-its u. So the covariance has everything, and the row of a term in (J'J)^-1 J' is what each certificate does to it. How far
-fluxes scatter is what their residuals say.
+Unknown are the map, what each phase has (the mean of the gains is one), what encoders are off (once a turn, and at each place
+by less than half a count), and offsets of readings. Those of the last two kinds have a certificate: its value is an
+observation with its u. So the covariance has everything, and the row of a term in (J'J)^-1 J' is what each certificate does to
+it. How far fluxes scatter is what their residuals say.
 """
 
 from __future__ import annotations
@@ -101,10 +101,10 @@ def _henries(rows: Rows) -> Array:
 
 
 def _by_pulses(by: Array, jacobian: Array, rows: Rows, left: Array) -> Array:
-    """Covariance (terms, terms) that residuals make. Those of one pulse are no repeats of each other: a flux is an integral, and
-    what is wrong with it is wrong on both flanks. So what each pulse does to the terms is taken whole, by the residuals it would
-    have if it had not been fitted, (1 - H)^-1 of those it has (Bell and McCaffrey, Survey Methodology 28, 169 (2002), their CR3:
-    the jackknife over pulses)."""
+    """Covariance (terms, terms) that residuals make. Those of one pulse are no repeats of each other: a flux is an integral,
+    and what is wrong with it is wrong on both flanks. So what each pulse does to the terms is taken whole, by the residuals it
+    would have if it had not been fitted, (1 - H)^-1 of those it has (Bell and McCaffrey, Survey Methodology 28, 169 (2002),
+    their CR3: the jackknife over pulses)."""
     pulse = rows.place * PHASES + rows.phase
     out = np.zeros((len(by), len(by)))
     for one in np.unique(pulse):

@@ -5,12 +5,13 @@
     Lam = slope gain [u + (1 - u) f],   f = (h(d) - h(quarter))/(h(0) - h(quarter)),   h = cos Nd + c2 cos 2Nd + c3 cos 3Nd
 
 d is the angle from where the phase is aligned, N the poles of the rotor, `quarter` half a pole's pitch, where phases are
-unaligned; a is the angle itself, and p, q what turns once with it. A lock that gives way by c rad for a N m lets the rotor turn by
-c T, T = dG/da Q(i), Q = i_s^2 (sqrt(1 + (i/i_s)^2) - 1), and likewise along. G is that of where
+unaligned; a is the angle itself, and p, q what turns once with it. A lock that gives way by c rad for a N m lets the rotor
+turn by c T, T = dG/da Q(i), Q = i_s^2 (sqrt(1 + (i/i_s)^2) - 1), and likewise along. G is that of where
 it comes to by the current of the sample before: it takes a while.
 
-Each phase has its own L_l and i_s. With readings g_i i and g_u u of current and voltage (g_u psi follows, `pulses`) L_l g_u/g_i,
-gain g_u/g_i and g_i i_s fit as well as the true ones: gains of readings cost the fit nothing, and are put right after it.
+Each phase has its own L_l and i_s. With readings g_i i and g_u u of current and voltage (g_u psi follows, `pulses`) L_l
+g_u/g_i, gain g_u/g_i and g_i i_s fit as well as the true ones: gains of readings cost the fit nothing, and are put right after
+it.
 """
 
 from __future__ import annotations
@@ -85,7 +86,7 @@ class Terms:
     @property
     def scale(self) -> int:
         """True metres to one that is read."""
-        return self.along.stop
+        return len(MAP) + PHASES * len(EACH) + 2 + 2 * self.places
 
     @property
     def count(self) -> int:

@@ -1,16 +1,15 @@
 """Map of a reluctance machine's inductances, by pulses of the whole supply on one phase of a locked rotor after the other.
 
-Measurands: the constants of the map's formula (`model`): inductance per metre of overlap of an aligned phase, mean of all; gains
-of phases relative to that mean; the unaligned share and harmonics of the angle; length, overlap and stray field of the stacks;
-leakage and saturation, means of the phases; zeros of the stators and the magnetic centre against the encoders' readings; what
-turns once with the angle.
+Measurands: the constants of the map's formula (`model`): inductance per metre of overlap of an aligned phase, mean of all;
+gains of phases relative to that mean; the unaligned share and harmonics of the angle; length, overlap and stray field of the
+stacks; leakage and saturation, means of the phases; zeros of the stators and the magnetic centre against the encoders'
+readings; what turns once with the angle.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from bench.rigfile.capture import rises
 from bench.errors import AnalysisError
 from bench.figures import Shown
 from bench.findings import Effect, Finding, Findings
@@ -22,6 +21,7 @@ from bench.procedure.states import transition
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
+from bench.rigfile.capture import rises
 from bench.rigfile.envelope import Envelope
 from procedures.inductance_map import checks, estimates
 from procedures.inductance_map import figures as drawn

@@ -3,15 +3,17 @@
     d psi/dt = u - R i,    psi = 0 before the pulse and after it.
 
 The pulse has three parts: the full supply until the current is at its limit, the limit held (there psi stands still, and
-R = u/i: of this winding, as warm as it is now, and how it warms), and the opposite voltage until no current is left. Up from zero,
-psi = integral of (u - R i); down to zero, psi = integral of (R i - u) over what is left of the pulse. A reading g_u u + b of the
-voltage and g i + o of the current give the same R g_u/g at the held end, and, with t the time since the flank's outer end,
+R = u/i: of this winding, as warm as it is now, and how it warms), and the opposite voltage until no current is left. Up from
+zero, psi = integral of (u - R i); down to zero, psi = integral of (R i - u) over what is left of the pulse. A reading g_u u +
+b of the voltage and g i + o of the current give the same R g_u/g at the held end, and, with t the time since the flank's outer
+end,
 
     up:    psi read = g_u psi + (b - R o)(t - integral of i/i_end)
     down:  psi read = g_u psi - b (t - integral of i/i_end) + R (o_down t - o integral of i/i_end) + L o_down
 
-(L o_down: what is read at the end is taken for a current that has its flux), so that gains cost no shape, and offsets little: R t is
-small against an inductance. What both read before the pulse is taken off; what is left of offsets is that of a bridge that is on. `late`, `lean` and `lag` below are the factors of b, o and o_down.
+(L o_down: what is read at the end is taken for a current that has its flux), so that gains cost no shape, and offsets little:
+R t is small against an inductance. What both read before the pulse is taken off; what is left of offsets is that of a bridge
+that is on. `late`, `lean` and `lag` below are the factors of b, o and o_down.
 """
 
 from __future__ import annotations
@@ -100,7 +102,9 @@ def _from_rest(u: Array, i: Array) -> tuple[Array, Array]:
     return (u, i) if before < REST else (u - u[:before].mean(), i - i[:before].mean())
 
 
-def _resistance(u: Array, i: Array, heat: Array, held: tuple[int, int], warming: float | None) -> tuple[float, float, Array]:
+def _resistance(
+    u: Array, i: Array, heat: Array, held: tuple[int, int], warming: float | None
+) -> tuple[float, float, Array]:
     """R in the middle of the held end, the share of it that comes in a second of the end's current, and by how much of it the
     winding is warmer at each sample: it warms as the integral of i^2, by as much as u/i grows while the current is held (6 A in
     7.8 Ohm and 60 J/K: 0.2 permille in 10 ms)."""

@@ -16,8 +16,8 @@ ORDERS = (1, 2, 3, 4, 5, 6)
 
 @dataclass(frozen=True)
 class Left:
-    """By pulse (places, 6): angle `d` from the aligned one, within half a period, `overlap` m, inductance per metre H/m that the
-    fit has and what pulses have beyond it; `aligned`, what it is at d = 0."""
+    """By pulse (places, 6): angle `d` from the aligned one, within half a period, `overlap` m, inductance per metre H/m that
+    the fit has and what pulses have beyond it; `aligned`, what it is at d = 0."""
 
     d: Array
     overlap: Array
@@ -56,7 +56,8 @@ def harmonics(of: Left, poles: int) -> dict[str, tuple[float, float]]:
 
 
 def by_depth(of: Left, r: Result) -> list[tuple[float, float, float]]:
-    """Of each stator at each position: overlap m, what is left in the mean as a share of the greatest inductance, its scatter."""
+    """Of each stator at each position: overlap m, what is left in the mean as a share of the greatest inductance, its
+    scatter."""
     out = []
     sent = np.array([t.place.x for t in r.taken])
     for stator in np.unique(r.rows.stator):
@@ -71,7 +72,12 @@ def torques(r: Result) -> Array:
     """Torque of each phase at the current of its pulse's end, N m (places, 6)."""
     _, around, _ = fit.at_places(r.found, r.rows)
     at = Terms(len(r.rows.x))
-    most = np.array([max((abs(p.current) for t in r.taken if (p := t.pulses.get(k.name)) is not None), default=0.0) for k in r.phases])
+    most = np.array(
+        [
+            max((abs(p.current) for t in r.taken if (p := t.pulses.get(k.name)) is not None), default=0.0)
+            for k in r.phases
+        ]
+    )
     root = np.sqrt(1 + (most / r.found.terms[at.each("saturation")]) ** 2)
     out: Array = around * most**2 / (1 + root)
     return out

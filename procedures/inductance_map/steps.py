@@ -32,8 +32,8 @@ class Shot:
 
 @dataclass(frozen=True)
 class Taken:
-    """A place: what the encoders read there, what was captured of each phase, and what the pulses show (None: nothing); `states`
-    of the controller before the pulses."""
+    """A place: what the encoders read there, what was captured of each phase, and what the pulses show (None: nothing);
+    `states` of the controller before the pulses."""
 
     place: Place
     x: float
@@ -87,13 +87,16 @@ def with_pulses(taken: Sequence[Taken]) -> list[Taken]:
     rates = [p.warming for each in first for p in each.values() if p is not None]
     rate = float(np.median(rates)) if rates else 0.0
     return [
-        replace(t, pulses={name: read(s.voltage, s.current, s.step_s, rate) for name, s in t.shots.items()}) for t in taken
+        replace(t, pulses={name: read(s.voltage, s.current, s.step_s, rate) for name, s in t.shots.items()})
+        for t in taken
     ]
 
 
 def rows(taken: Sequence[Taken], rig: RigFile) -> Rows:
     """Every sample of every flank."""
-    parts: dict[str, list[Array]] = {n: [] for n in ("phase", "place", "down", "current", "before", "flux", "late", "lean", "lag")}
+    parts: dict[str, list[Array]] = {
+        n: [] for n in ("phase", "place", "down", "current", "before", "flux", "late", "lean", "lag")
+    }
     some, noise = phases(rig), []
     for m, t in enumerate(taken):
         for k, phase in enumerate(some):

@@ -25,7 +25,9 @@ COUNTS = 3.0  # by which the shaft may go while it is read
 def of_signals(rests: Sequence[Rest], rig: RigFile, plan: Plan) -> Iterator[Finding]:
     """Nothing recorded, another state, losses, currents that are not what was asked for."""
     if not rests:
-        yield Finding("no-approaches", "the shaft was not drawn in anywhere (was the run stopped early?)", "", Effect.ERROR)
+        yield Finding(
+            "no-approaches", "the shaft was not drawn in anywhere (was the run stopped early?)", "", Effect.ERROR
+        )
         return
     for r in rests:
         if other := [s for s in r.states if rig.binding.mode(s) != READY]:
@@ -52,9 +54,10 @@ def of_order(rests: Sequence[Rest], rig: RigFile, plan: Plan) -> Iterator[Findin
     for name in dict.fromkeys(r.approach.phase.name for r in rests):
         some = [r for r in rests if r.approach.phase.name == name and r.level == last]
         each = np.array([off(r) for r in some])
+        far = float(np.median(np.abs(each)))
         sides = np.array([r.approach.side for r in some])
-        if np.median(np.abs(each)) > FAR:
-            text = (f"it draws the shaft to {math.degrees(float(np.median(np.abs(each)))):.3g}° from where the rig file has it aligned: "
+        if far > FAR:
+            text = (f"it draws the shaft to {math.degrees(far):.3g}° from where the rig file has it aligned: "
                     "phases are exchanged, or the encoder's zero is another one.")  # fmt: skip
             yield Finding("phase-draws-elsewhere", text, name, Effect.ERROR)
         elif np.median(np.abs(each - sides * plan.start_rad)) < 0.1 * plan.start_rad:
@@ -63,10 +66,11 @@ def of_order(rests: Sequence[Rest], rig: RigFile, plan: Plan) -> Iterator[Findin
 
 
 def of_results(found: Sequence[Stator], rests: Sequence[Rest], rig: RigFile, plan: Plan) -> Iterator[Finding]:
-    """Stators without enough alignments, friction that hides the zero, a pull on one side, phases apart, a shaft that creeps."""
+    """Stators without enough alignments, friction that hides the zero, a pull on one side, phases apart, a shaft that
+    creeps."""
     motors = dict.fromkeys(r.approach.phase.motor for r in rests)
     if missing := [m for m in motors if m not in {s.motor for s in found}]:
-        yield Finding("too-few-alignments", f"of {', '.join(missing)} fewer than three were come to from both sides.", missing[0],
+        yield Finding("too-few-alignments", f"of {', '.join(missing)} fewer than three came from both sides.", missing[0],
                       Effect.ERROR)  # fmt: skip
         return
     for s in found:
@@ -83,14 +87,14 @@ def _of_stator(s: Stator, plan: Plan) -> Iterator[Finding]:
     band = s.estimates["band"]
     concerned = (f"zero@{s.motor}",)
     if band.value > plan.max_band_rad:
-        text = f"friction leaves {math.degrees(band.value):.2g}° to either side; {math.degrees(plan.max_band_rad):.2g}° allowed."
+        text = f"friction leaves {math.degrees(band.value):.2g}° to each side; allowed {math.degrees(plan.max_band_rad):.2g}°."
         yield Finding("friction-wide", text, s.motor, Effect.INDETERMINATE, concerned)
     if band.value < -APART * band.u:
         text = "from above the shaft came to rest below where it did from below: it swings past. Ramp slower."
         yield Finding("swings-past", text, s.motor, Effect.INDETERMINATE, concerned)
     moved, u = drift(s)
     if abs(moved) > plan.max_spread_rad + APART * u:
-        text = (f"at {s.levels[0]:g} A the mean of both sides is {math.degrees(moved):+.2g}° from that at {s.levels[-1]:g} A: a "
+        text = (f"at {s.levels[0]:g} A both sides' mean is {math.degrees(moved):+.2g}° from that at {s.levels[-1]:g} A: a "
                 "steady torque is on the shaft, or friction differs both ways.")  # fmt: skip
         yield Finding("steady-torque", text, s.motor, Effect.INDETERMINATE, concerned)
     each = s.means.mean(axis=1)

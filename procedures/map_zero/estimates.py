@@ -2,8 +2,8 @@
 
 A phase that carries i turns the shaft until its torque is what friction takes, k q(i) d = -T_c sign of the motion, so that from
 above it stops at d = T_c/(k q) and from below at -d. The mean of both is the zero where friction is alike both ways; half of
-their difference, the band, falls as 1/q. What pulls steadily (a cord, an unbalance) moves both ways alike, also as 1/q: the means
-of the levels are a line over 1/q = 2/i^2 roughly, and show it.
+their difference, the band, falls as 1/q. What pulls steadily (a cord, an unbalance) moves both ways alike, also as 1/q: the
+means of the levels are a line over 1/q = 2/i^2 roughly, and show it.
 """
 
 from __future__ import annotations
@@ -60,12 +60,16 @@ def stators(rests: Sequence[Rest], rig: RigFile) -> list[Stator]:
     levels = sorted({r.level for r in rests})
     by = {(r.approach.phase.name, r.approach.tooth, r.approach.side, r.level): r for r in rests}
     for motor in dict.fromkeys(r.approach.phase.motor for r in rests):
-        keys = dict.fromkeys((r.approach.phase.name, r.approach.tooth) for r in rests if r.approach.phase.motor == motor)
+        keys = dict.fromkeys(
+            (r.approach.phase.name, r.approach.tooth) for r in rests if r.approach.phase.motor == motor
+        )
         whole = [k for k in keys if all((*k, side, level) in by for side in BOTH for level in levels)]
         if len(whole) < 3:
             continue
         below, above = (np.array([[off(by[*k, side, level]) for level in levels] for k in whole]) for side in BOTH)
-        names = tuple(f"{name}, {math.degrees(by[name, tooth, 1, levels[0]].approach.aligned):.4g}°" for name, tooth in whole)
+        names = tuple(
+            f"{name}, {math.degrees(by[name, tooth, 1, levels[0]].approach.aligned):.4g}°" for name, tooth in whole
+        )
         made = Stator(motor, names, np.array(levels), below, above, {})
         made.estimates.update(_estimates(made, rig))
         out.append(made)
@@ -78,8 +82,9 @@ def off(rest: Rest) -> float:
 
 
 def _estimates(of: Stator, rig: RigFile) -> Mapping[str, Estimate]:
-    """Over all alignments, without what goes once a turn with the angle: the encoder's own error, and what unevenness draws aside.
-    Their scatter has most of what counts do; readings that agree to the count show none of it, so that it is told beside."""
+    """Over all alignments, without what goes once a turn with the angle: the encoder's own error, and what unevenness draws
+    aside. Their scatter has most of what counts do; readings that agree to the count show none of it, so that it is told
+    beside."""
     angle, out = axis(rig, "angle"), {}
     for name, each in (("zero", of.means.mean(axis=1)), ("band", of.bands[:, -1])):
         value, u, dof = mean_around(each, of.angles)

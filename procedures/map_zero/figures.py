@@ -24,7 +24,7 @@ def _alignments(found: Sequence[Stator]) -> Figure:
         for label, each in (("from below", s.below), ("from above", s.above)):
             series.append(Series(f"{s.motor}, {label}", angles[order], np.degrees(each[order, -1]), "both"))
         lines.append((f"zero of {s.motor}", float(np.degrees(s.estimates["zero"].value))))
-    caption = "What the encoder reads at the last level, less where the rig file has the phase aligned. Between both sides is friction."
+    caption = "What the encoder reads at the last level, less where the phase should be aligned. Between the sides is friction."
     return Figure("alignments", "Where phases draw the shaft", caption, "angle / °", "reading less aligned / °", tuple(series),
                   lines=tuple(lines))  # fmt: skip
 
@@ -34,5 +34,7 @@ def _levels(found: Sequence[Stator]) -> Figure:
     for s in found:
         for label, each in (("from below", s.below), ("from above", s.above), ("mean of both", s.means)):
             series.append(Series(f"{s.motor}, {label}", s.levels, np.degrees(each.mean(axis=0)), "both"))
-    caption = "Mean of all alignments by the current: what friction leaves falls as one over the torque's stiffness, the mean stays."
+    caption = (
+        "Mean of all alignments by the current: what friction leaves falls with the torque's stiffness, the mean stays."
+    )
     return Figure("levels", "By the current", caption, "current / A", "reading less aligned / °", tuple(series))

@@ -28,7 +28,9 @@ from procedures.map_zero.steps import LEVEL, STATE, read_rests
 from procedures.shared import assumptions
 from procedures.stages.stators import axis, lacks, phases
 
-ZERO = Quantity("zero", "rad", "what the encoder reads where the first phase of a stator is aligned, mean over the turn")
+ZERO = Quantity(
+    "zero", "rad", "what the encoder reads where the first phase of a stator is aligned, mean over the turn"
+)
 BAND = Quantity("band", "rad", "half of what the shaft stops apart from below and above, at the greatest current",
                 title="friction band")  # fmt: skip
 MEASURES = (ZERO, BAND)

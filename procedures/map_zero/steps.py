@@ -18,8 +18,8 @@ LEVEL, STATE = "level", "state"
 
 @dataclass(frozen=True)
 class Rest:
-    """Of one approach at one `level` A: what the encoders read, rad and m, how far the angle went meanwhile, the current as it is
-    read, `states` of the controller."""
+    """Of one approach at one `level` A: what the encoders read, rad and m, how far the angle went meanwhile, the current as it
+    is read, `states` of the controller."""
 
     approach: Approach
     level: float

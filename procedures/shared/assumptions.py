@@ -232,6 +232,6 @@ INDUCTANCE_MAP = (
 )
 MAP_ZERO = (
     "Friction that differs by the way the shaft turns: a tenth more one way moves the zero by a tenth of the band.",
-    "Inductance that grows to one side over the width of a tooth: the shaft comes to rest where it is greatest, which is what is "
+    "Inductance that grows to one side over the width of a tooth: the shaft comes to rest where it is greatest, and that is "
     "told.",
 )

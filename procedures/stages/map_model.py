@@ -18,10 +18,16 @@ def names(stators: Sequence[str], phases: Sequence[str]) -> dict[str, str]:
     return {**WHOLE, **zeros, **gains}
 
 
-def parameters(rig: RigFile, values: Mapping[str, float], stators: Sequence[str], phases: Sequence[str]) -> dict[str, float]:
+def parameters(
+    rig: RigFile, values: Mapping[str, float], stators: Sequence[str], phases: Sequence[str]
+) -> dict[str, float]:
     """The controller's parameters, SI, of what was measured (`name` or `name@place`)."""
     model = rig.capabilities.model
-    return {model[meaning]: values[name] for meaning, name in names(stators, phases).items() if meaning in model and name in values}
+    return {
+        model[meaning]: values[name]
+        for meaning, name in names(stators, phases).items()
+        if meaning in model and name in values
+    }
 
 
 def present(rig: RigFile, meaning: str, otherwise: float) -> float:

@@ -14,14 +14,15 @@ from dataclasses import dataclass
 from bench.rigfile import RigFile
 from bench.rigfile.places import Places
 from bench.rigfile.stage import StageAxis, axes_of
+from bench.rigfile.toleranced import Toleranced
 
 POLES = "rotor_poles"
 
 
 @dataclass(frozen=True)
 class Phase:
-    """One phase: `value` of the parameter that chooses it, channels of its `current` and `voltage`, its motor and which one that
-    is (`stator`), the angle at which it is `aligned`, rad, and to which `side` its stator draws."""
+    """One phase: `value` of the parameter that chooses it, channels of its `current` and `voltage`, its motor and which one
+    that is (`stator`), the angle at which it is `aligned`, rad, and to which `side` its stator draws."""
 
     name: str
     value: float
@@ -48,7 +49,18 @@ def phases(rig: RigFile) -> tuple[Phase, ...]:
             name = by_channel.get(channel)
             if name is not None and name in can.phases:
                 aligned = k * math.pi / len(channels)
-                out.append(Phase(name, can.phases[name], channel, can.voltages.get(name, ""), motor, stator, aligned, sides[motor]))
+                out.append(
+                    Phase(
+                        name,
+                        can.phases[name],
+                        channel,
+                        can.voltages.get(name, ""),
+                        motor,
+                        stator,
+                        aligned,
+                        sides[motor],
+                    )
+                )
     return tuple(out)
 
 
@@ -57,7 +69,10 @@ def _sides(rig: RigFile, motors: list[str]) -> Mapping[str, int]:
     places, at = Places(rig), {}
     for k, motor in enumerate(motors):
         stated = rig.motors[motor].at
-        at[motor] = float(k) if stated is None else places.number(stated, f"motors.{motor}.at").number.value
+        if isinstance(stated, Toleranced | str):
+            at[motor] = places.number(stated, f"motors.{motor}.at").number.value
+        else:
+            at[motor] = float(k)
     middle = sum(at.values()) / max(len(at), 1)
     return {motor: 1 if value > middle else -1 for motor, value in at.items()}
 
@@ -79,6 +94,10 @@ def lacks(rig: RigFile, stators: int = 1) -> tuple[str, ...]:
     if not poles(rig):
         out.append(f"machine: found no {POLES}")
     if len({p.motor for p in found}) < stators:
-        out.append(f"motors: found phases of {len({p.motor for p in found})} motors that can be tested; expected {stators}")
-    out += [f"encoders: found none that measures {m} and is positioned" for m in ("stroke", "angle") if axis(rig, m) is None]
+        out.append(
+            f"motors: found phases of {len({p.motor for p in found})} motors that can be tested; expected {stators}"
+        )
+    out += [
+        f"encoders: found none that measures {m} and is positioned" for m in ("stroke", "angle") if axis(rig, m) is None
+    ]
     return tuple(out)

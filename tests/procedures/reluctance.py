@@ -46,7 +46,10 @@ def taken(rig: RigFile, params: PlantParams, plan: Plan = SHORT, gains: Sequence
         for k, phase in enumerate(some):
             u, i, others = pulse(plant, k)
             other = float(np.abs(np.delete(others[200:400], k, axis=1).mean(axis=0)).max())
-            u, i = u + noise[1] * rng.standard_normal(u.size), gains[k] * i + offset + noise[0] * rng.standard_normal(u.size)
+            u, i = (
+                u + noise[1] * rng.standard_normal(u.size),
+                gains[k] * i + offset + noise[0] * rng.standard_normal(u.size),
+            )
             shots[phase.name] = Shot(1 / TICKS_S, u, i, other, (0.0, 0.0))
         out.append(Taken(place, float(read[AT["x"]]), float(read[AT["angle"]]), shots, {}, ("READY",)))
     return with_pulses(out)

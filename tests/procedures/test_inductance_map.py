@@ -36,6 +36,7 @@ from rlsrm_bench import SHAPED, column, drawn, flown, sine
 
 RIG = load_rig("rlsrm")
 STEP = 1 / TICKS_S
+WHOLE = ("slope", "unaligned", "c2", "c3", "length", "overlap", "fringe", "leakage", "saturation", "centre")
 
 
 def shot(params: PlantParams, x: float = 0.0, angle: float = 0.0, k: int = 0) -> pulses.Pulse:
@@ -60,7 +61,8 @@ def test_flux_of_a_pulse() -> None:
 
 
 def test_what_a_cold_resistance_makes_of_it() -> None:
-    """The trap by hand: R 4 % small over 1 ms up to 6 A of 75 mWb leaves 0.04 R times the integral of i, about 1.2 mWb: 1.5 %."""
+    """The trap by hand: R 4 % small over 1 ms up to 6 A of 75 mWb leaves 0.04 R times the integral of i, about 1.2 mWb: 1.5
+    %."""
     plant = Plant(replace(PlantParams(ambient=30.0), locked=(1.0, 1.0)))
     plant.switch(on=True)
     u, i, _ = pulse(plant, 0)
@@ -124,7 +126,9 @@ def test_the_map_of_a_drawn_machine(sound: list[Taken]) -> None:
     found, result = told(sound)
     assert loud(found) == set()
     assert result is not None
-    off = {key: (result.estimates[key].value - value) / result.estimates[key].u for key, value in truth(drawn(3)).items()}
+    off = {
+        key: (result.estimates[key].value - value) / result.estimates[key].u for key, value in truth(drawn(3)).items()
+    }
     assert max(map(abs, off.values())) < 4, off
     assert np.sqrt(np.mean(np.square(list(off.values())))) < 1.6, off
     assert result.estimates["slope", ""].u < 2e-3
@@ -214,8 +218,9 @@ def test_the_grid() -> None:
 
 
 def test_a_controller_that_is_given_the_map(sound: list[Taken]) -> None:
-    """H1, the angle follows 200 degrees in 5 s: true force beyond what the controller's map says, over 50 ms, falls from 10 mN to
-    6 mN, which is what its own map leaves (0.56). In all of it, 30 mN, are hand-overs of one millisecond, which no map takes off."""
+    """H1, the angle follows 200 degrees in 5 s: true force beyond what the controller's map says, over 50 ms, falls from 10 mN
+    to 6 mN, which is what its own map leaves (0.56). In all of it, 30 mN, are hand-overs of one millisecond, which no map
+    takes off."""
     p = drawn(3)
     _, result = told(sound)
     assert result is not None
@@ -229,7 +234,7 @@ def test_a_controller_that_is_given_the_map(sound: list[Taken]) -> None:
         return float(np.sqrt(np.mean(np.convolve(off, np.full(50, 0.02), "valid") ** 2)))
 
     found = Map(
-        **{n: given[f"map_{n}"] for n in ("slope", "unaligned", "c2", "c3", "length", "overlap", "fringe", "leakage", "saturation", "centre")},
+        **{n: given[f"map_{n}"] for n in WHOLE},
         gain=tuple(given[f"map_gain_{k}"] for k in range(1, 7)), zero=(given["map_zero_1"], given["map_zero_2"]),
     )  # fmt: skip
     assert cross(found) < 0.65 * cross(ControlParams().map)

@@ -21,7 +21,9 @@ def read_frame(p: PlantParams) -> Map:
     """The map over readings: in the mean over places an encoder reads more than is by where its edges lie."""
     along, around = (e * c for e, c in zip(p.edge, p.pitch, strict=True))
     m = p.map
-    return replace(m, zero=(m.zero[0] + around, m.zero[1] + around), centre=m.centre + along, uneven_phase=m.uneven_phase + around)
+    return replace(
+        m, zero=(m.zero[0] + around, m.zero[1] + around), centre=m.centre + along, uneven_phase=m.uneven_phase + around
+    )
 
 
 def of_map(rig: RigFile, drawn: Any) -> Told:
@@ -32,7 +34,8 @@ def of_map(rig: RigFile, drawn: Any) -> Told:
         ("slope", ""): m.slope * mean, ("unaligned", ""): m.unaligned, ("c2", ""): m.c2, ("c3", ""): m.c3,
         ("length", ""): m.length, ("overlap", ""): m.overlap, ("fringe", ""): m.fringe, ("leakage", ""): m.leakage,
         ("saturation", ""): m.saturation, ("centre", ""): m.centre,
-        ("uneven", "cosine"): m.uneven * float(np.cos(m.uneven_phase)), ("uneven", "sine"): m.uneven * float(np.sin(m.uneven_phase)),
+        ("uneven", "cosine"): m.uneven * float(np.cos(m.uneven_phase)),
+        ("uneven", "sine"): m.uneven * float(np.sin(m.uneven_phase)),
         ("give", ""): drawn.values["lock_give_angle"], ("give_x", ""): drawn.values["lock_give_x"],
     }  # fmt: skip
     out |= {("gain", name): g / mean for name, g in zip(PHASES, m.gain, strict=True)}
@@ -57,7 +60,7 @@ def _band(p: PlantParams, stator: int, n: int, tooth: int, amperes: float) -> fl
     at = (ALIGNED[n] + 90 * tooth) * DEG + p.map.zero[stator]
 
     def left(d: float, sign: int) -> float:
-        return float(slopes(p.map, 0.0, at + d)[2][3 * stator + n]) * q + sign * rubs
+        return float(slopes(p.map, 0.0, at + d)[2][3 * stator + n]) * float(q) + sign * rubs
 
     ends = [brentq(left, -8 * DEG, 8 * DEG, args=(sign,)) for sign in (1, -1)]
-    return 0.5 * (ends[0] - ends[1])
+    return float(0.5 * (ends[0] - ends[1]))
