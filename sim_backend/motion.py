@@ -255,7 +255,7 @@ class Motions:
         cogging: harmonics of it along and around, by quantity and where, of a shaft turned at rad/s at a place, m.
         runout: what turns with the shaft, vectors by quantity, plane and place along, m.
         inductances: constants of a map of inductances, as encoders read places, by quantity and where.
-        stators: where phases draw the shaft at a current, A, by quantity and where.
+        stators: where phases draw the shaft, by quantity and where.
         speeds: at the torque limit, by sharing: `speed` rad/s, `bound` A of the torque current, `ripple` rad/s.
     """
 
@@ -282,7 +282,7 @@ class Motions:
     pulls: Callable[[RigFile, Any, float, float], Mapping[tuple[str, str], float]] | None = None
     cogging: Callable[[RigFile, Any, float, float], Mapping[tuple[str, str], float]] | None = None
     inductances: Callable[[RigFile, Any], Mapping[tuple[str, str], float]] | None = None
-    stators: Callable[[RigFile, Any, float], Mapping[tuple[str, str], float]] | None = None
+    stators: Callable[[RigFile, Any], Mapping[tuple[str, str], float]] | None = None
     runout: Callable[[RigFile, Any, Sequence[float]], Mapping[tuple[str, str, float], complex]] | None = None
 
 

@@ -31,7 +31,7 @@ from procedures.inductance_map.plan import Plan
 from procedures.inductance_map.steps import PLACE, STATE, captured, read_taken
 from procedures.shared import assumptions
 from procedures.shared.rates import of_rate
-from procedures.stages.stators import Phase, axis, lacks, phases
+from procedures.stages.stators import POLES, Phase, axis, lacks, phases
 
 USUAL_HZ = 20e3
 BEFORE_S = 2e-3
@@ -161,6 +161,7 @@ def requires(rig: RigFile) -> Requires:
         roles=("motion", "operator"),
         channels=(STATE, *(a.channel for a in (axis(rig, "stroke"), axis(rig, "angle")) if a is not None)),
         sensors=tuple(c for p in some for c in (p.current, p.voltage) if c),
+        machine=(POLES,),
         capabilities=wanted,
         capture=tuple(c for p in some for c in (p.current, p.voltage) if c),
         lacks=(*lacks(rig, 2), *(f"capabilities.phase_test: found no {key}" for key in missing), *(_six(some)),

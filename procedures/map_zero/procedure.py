@@ -26,7 +26,7 @@ from procedures.map_zero.estimates import Stator
 from procedures.map_zero.plan import Plan
 from procedures.map_zero.steps import LEVEL, STATE, read_rests
 from procedures.shared import assumptions
-from procedures.stages.stators import axis, lacks, phases
+from procedures.stages.stators import POLES, axis, lacks, phases
 
 ZERO = Quantity(
     "zero", "rad", "what the encoder reads where the first phase of a stator is aligned, mean over the turn"
@@ -129,6 +129,7 @@ def requires(rig: RigFile) -> Requires:
         roles=("motion", "operator"),
         channels=(STATE, *(a.channel for a in (axis(rig, "stroke"), axis(rig, "angle")) if a is not None),
                   *(p.current for p in phases(rig))),
+        machine=(POLES,),
         capabilities=wanted,
         lacks=(*lacks(rig), *(() if test.current else ("capabilities.phase_test: found no current",))),
     )  # fmt: skip

@@ -19,9 +19,8 @@ def inductances(done: Simulated) -> Found:
 
 
 def zeros(done: Simulated) -> Found:
-    """Zeros of stators, and what friction leaves of them at the greatest level."""
+    """Zeros of stators. The band is what was seen: it has no truth but itself."""
     of = done.drawn.machine.motions.stators
     if of is not None:
-        most = max(done.recording.plan.levels_A)
-        for (name, where), value in of(done.recording.rig, done.drawn, most).items():
+        for (name, where), value in of(done.recording.rig, done.drawn).items():
             yield name, where, value

@@ -1,4 +1,4 @@
-"""Truth of the map of inductances as encoders read places, and of where phases draw the shaft."""
+"""Truth of the map of inductances, as encoders read places."""
 
 from __future__ import annotations
 
@@ -7,14 +7,11 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
 
 from bench.rigfile import RigFile
-from sim_backend.machines.rlsrm.params import DEG, PHASES, Map, PlantParams
-from sim_backend.machines.rlsrm.plant import slopes
+from sim_backend.machines.rlsrm.params import PHASES, Map, PlantParams
 
 Told = Mapping[tuple[str, str], float]
-ALIGNED = (0.0, 60.0, 30.0)  # degrees, of A, B, C within a tooth's 90
 
 
 def read_frame(p: PlantParams) -> Map:
@@ -42,25 +39,7 @@ def of_map(rig: RigFile, drawn: Any) -> Told:
     return out | {("zero", motor): m.zero[k] for k, motor in enumerate(motors)}
 
 
-def of_zeros(rig: RigFile, drawn: Any, amperes: float) -> Told:
-    """Zeros, and by how much friction keeps the shaft from them at a current: mean of phases and teeth."""
-    p, out = drawn.plant.plant, {}
-    m = read_frame(p)
-    for k, motor in enumerate(rig.motors):
-        out["zero", motor] = m.zero[k]
-        each = [_band(p, k, n, tooth, amperes) for n in range(3) for tooth in range(4)]
-        out["band", motor] = float(np.mean(each))
-    return out
-
-
-def _band(p: PlantParams, stator: int, n: int, tooth: int, amperes: float) -> float:
-    """Half of what the shaft stops apart where one phase draws against friction."""
-    q = amperes**2 / (np.sqrt(1 + (amperes / p.map.saturation) ** 2) + 1)
-    rubs = p.coulomb * p.bearing_radius
-    at = (ALIGNED[n] + 90 * tooth) * DEG + p.map.zero[stator]
-
-    def left(d: float, sign: int) -> float:
-        return float(slopes(p.map, 0.0, at + d)[2][3 * stator + n]) * float(q) + sign * rubs
-
-    ends = [brentq(left, -8 * DEG, 8 * DEG, args=(sign,)) for sign in (1, -1)]
-    return float(0.5 * (ends[0] - ends[1]))
+def of_zeros(rig: RigFile, drawn: Any) -> Told:
+    """Zeros, by motor."""
+    m = read_frame(drawn.plant.plant)
+    return {("zero", motor): m.zero[k] for k, motor in enumerate(rig.motors)}
