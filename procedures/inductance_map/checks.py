@@ -19,6 +19,7 @@ from procedures.stages.stators import axis, phases, poles
 
 READY = "READY"
 APART = 4.5  # standard uncertainties that what should be alike may lie apart
+GAINS = 3.0  # standard uncertainties of a reading's gain: beyond what a certificate allows one phase against the mean of all
 ALIGNED = math.radians(12)  # by which a phase may be aligned elsewhere than its place in the stator says
 REACHED = 0.9  # of the pulses' usual current
 ONE = 0.99  # of a correlation: two numbers that are one
@@ -110,6 +111,7 @@ def of_results(r: Result, rig: RigFile, plan: Plan) -> Iterator[Finding]:
     """A lock that gives way, phases that saturate apart, what the formula lacks, numbers that the pulses do not part."""
     yield from _lock(r, rig, plan)
     yield from _saturation(r, rig)
+    yield from _leakage(r, rig, plan)
     for k, p in enumerate(r.phases):
         up, down = fit.flanks(r.found, r.rows, k)
         if abs(up - down) > plan.max_apart:
@@ -147,10 +149,24 @@ def _saturation(r: Result, rig: RigFile) -> Iterator[Finding]:
     share = each / each.mean() - 1
     for k, p in enumerate(r.phases):
         known = rig.sensors[p.current].gain.standard_uncertainty
-        if abs(share[k]) > APART * math.hypot(known, scatter[k] / each[k]):
+        if abs(share[k]) > math.hypot(GAINS * known, APART * scatter[k] / each[k]):
             text = (f"it saturates at {share[k]:+.2%} of the others' current as its current is read: its reading has another "
                     "gain, or its teeth are not theirs.")  # fmt: skip
             yield Finding("phase-saturates-apart", text, p.name, Effect.INDETERMINATE, (f"gain@{p.name}", "saturation"))
+
+
+def _leakage(r: Result, rig: RigFile, plan: Plan) -> Iterator[Finding]:
+    """What flux goes past the mover is the same in coils that are alike: a phase that has more has another gain of a
+    reading."""
+    at = Terms(len(r.rows.x)).each("leakage")
+    each, scatter = r.found.terms[at], np.sqrt(np.diag(r.found.scatter))[at]
+    share = each / each.mean() - 1
+    for k, p in enumerate(r.phases):
+        known = [rig.sensors[c].gain.standard_uncertainty for c in (p.current, p.voltage)]
+        if abs(share[k]) > plan.leakage_share + math.hypot(GAINS * math.hypot(*known), APART * scatter[k] / each[k]):
+            text = (f"its leakage is {share[k]:+.2%} from the others': another gain of its voltage, or its coil's ends "
+                    "are not theirs.")  # fmt: skip
+            yield Finding("leakage-apart", text, p.name, Effect.INDETERMINATE, (f"gain@{p.name}", "leakage", "slope"))
 
 
 def _formula(of: Left, r: Result, plan: Plan) -> Iterator[Finding]:

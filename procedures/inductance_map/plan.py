@@ -20,6 +20,9 @@ class Plan(BenchPlan):
     rest_s: float = Field(0.1, ge=0.02)  # locked: how long the place is read
     max_residual: float = Field(5e-3, gt=0)  # of a flux, as a share of the aligned: what the formula may lack
     max_yield_rad: float = Field(5e-3, gt=0)  # by which the lock may turn under the greatest torque
+    leakage_share: float = Field(
+        5e-3, gt=0
+    )  # by which leakages of phases may differ, beside what gains of readings make of it
     max_other_A: float = Field(0.06, gt=0)  # of the phases that have no pulse
     max_apart: float = Field(0.01, gt=0)  # by which fluxes up and down may differ, of their size
     weak: float = Field(0.8, gt=0, lt=1)  # share of the others' voltage that a pulse must have
