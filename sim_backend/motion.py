@@ -255,7 +255,12 @@ class Motions:
         pulls: of where a channel along and one around read, what holds a shaft that magnets pull, by quantity and where.
         cogging: harmonics of it along and around, by quantity and where, of a shaft turned at rad/s at a place, m.
         runout: what turns with the shaft, vectors by quantity, plane and place along, m.
+<<<<<<< HEAD
         loads: compliance, friction, scale of the force and answers to loads, by quantity and where.
+=======
+        inductances: constants of a map of inductances, as encoders read places, by quantity and where.
+        stators: where phases draw the shaft, by quantity and where.
+>>>>>>> 9233d206b016ca32e56f66e4f8c2f82886054341
         speeds: at the torque limit, by sharing: `speed` rad/s, `bound` A of the torque current, `ripple` rad/s.
     """
 
@@ -281,7 +286,12 @@ class Motions:
     ) = None
     pulls: Callable[[RigFile, Any, float, float], Mapping[tuple[str, str], float]] | None = None
     cogging: Callable[[RigFile, Any, float, float], Mapping[tuple[str, str], float]] | None = None
+<<<<<<< HEAD
     loads: Callable[[RigFile, Any, LoadsAsked], Mapping[tuple[str, str], float]] | None = None
+=======
+    inductances: Callable[[RigFile, Any], Mapping[tuple[str, str], float]] | None = None
+    stators: Callable[[RigFile, Any], Mapping[tuple[str, str], float]] | None = None
+>>>>>>> 9233d206b016ca32e56f66e4f8c2f82886054341
     runout: Callable[[RigFile, Any, Sequence[float]], Mapping[tuple[str, str, float], complex]] | None = None
 
 

@@ -23,6 +23,7 @@ from bench.cli.truths import (
     one_axis,
     positioned,
     pull,
+    reluctance,
     rotor,
     turning,
     weights,
@@ -78,5 +79,10 @@ TRUTHS: Mapping[str, Callable[[Any], Found]] = {
     "coil-map": coils.shares,
     "gate-margin": gate.margins,
     "bearing-constant": weights.constants,
+<<<<<<< HEAD
     "positioning": positioned.figures,
+=======
+    "map-zero": reluctance.zeros,
+    "inductance-map": reluctance.inductances,
+>>>>>>> 9233d206b016ca32e56f66e4f8c2f82886054341
 }

@@ -243,3 +243,15 @@ POSITIONING = (
     "Another day, load or place: the next five approaches have a scatter of their own, whose s is this one within a factor of "
     "0.32 to 3.1 (95 %, five and five approaches).",
 )
+INDUCTANCE_MAP = (
+    "Currents' readings that are all wrong by a share change slope and leakage by that share, saturation by its opposite; "
+    "voltages' change slope and leakage. Phases that are alike show one that is off from the others, and no more.",
+    "Iron that keeps a flux, or lags behind its current, in the same way at every place.",
+    "Time is the controller's: a clock that is fast by 1e-4 makes fluxes smaller by that share.",
+    "An encoder along that is off within its travel by more than its pitch: 1 µm at one place is 0.007 % of the overlap.",
+)
+MAP_ZERO = (
+    "Friction that differs by the way the shaft turns: a tenth more one way moves the zero by a tenth of the band.",
+    "Inductance that grows to one side over the width of a tooth: the shaft comes to rest where it is greatest, and that is "
+    "told.",
+)
