@@ -15,6 +15,7 @@ from bench.cli.truths import (
     coils,
     delays,
     emf,
+    following,
     gate,
     held,
     linear_rotary,
@@ -78,11 +79,10 @@ TRUTHS: Mapping[str, Callable[[Any], Found]] = {
     "runout-map": turning.runout,
     "coil-map": coils.shares,
     "gate-margin": gate.margins,
+    "step-following": following.steps,
+    "sine-following": following.sines,
     "bearing-constant": weights.constants,
-<<<<<<< HEAD
     "positioning": positioned.figures,
-=======
     "map-zero": reluctance.zeros,
     "inductance-map": reluctance.inductances,
->>>>>>> 9233d206b016ca32e56f66e4f8c2f82886054341
 }

@@ -255,3 +255,10 @@ MAP_ZERO = (
     "Inductance that grows to one side over the width of a tooth: the shaft comes to rest where it is greatest, and that is "
     "told.",
 )
+FOLLOWING = (
+    "An encoder that has slipped, or whose zero was not found where it is, moves every true place by as much, and no reading. "
+    "An error of an encoder beyond what the rig file states does so, too.",
+    "An encoder that gives the next lower count in place of the nearest: all places are half a count farther than they read.",
+    "Time is the controller's: a clock that is fast by 1e-4 makes times and lags shorter by that share.",
+    "The machine as it is then: friction that changes by 10 % moves what is left without integrators by up to as much.",
+)
