@@ -129,7 +129,7 @@ def requires(rig: RigFile, parts: Sequence[str] = ()) -> Requires:
              if not getattr(a, part)]  # fmt: skip
     return Requires(
         roles=("motion",), channels=(*(a.channel for a in axes), STATE), capabilities=("positioning",),
-        uses=("settings.integrators",), lacks=(*lacks, *lacks_counts(rig)),
+        uses=("settings.integrators", "current_limit"), lacks=(*lacks, *lacks_counts(rig)),
     )  # fmt: skip
 
 

@@ -262,11 +262,12 @@ def test_one_axis_is_enough() -> None:
 def test_plans_that_cannot_work() -> None:
     assert not list(check(RLSRM, Plan()))
     for plan, key in (
-        ({"places_m": (0.0, 0.02)}, "places_m"), ({"places_m": (0.0, 0.0)}, "places_m"), ({"rest_s": 2.0}, "rest_s"),
+        ({"places_m": (0.0, 0.02)}, "places_m"), ({"places_m": (0.0, 0.0)}, "places_m"), ({"rest_s": 3.0}, "rest_s"),
         ({"integrators": "half"}, "integrators"),
     ):  # fmt: skip
         problems = list(check(RLSRM, Plan().model_copy(update=plan)))
         assert len(problems) == 1
         assert problems[0].startswith(key)
-    without = {n: replace(a, pitch=None) for n, a in axes_of(RLSRM).items()}
-    assert set(without) == {"x", "angle"}
+    encoders = {n: e.model_copy(update={"pitch": None, "counts": None}) for n, e in RLSRM.encoders.items()}
+    (said,) = requires(RLSRM.model_copy(update={"encoders": encoders})).lacking(RLSRM)
+    assert said.startswith("encoders: found no pitch of x, angle")
