@@ -86,7 +86,7 @@ def without_capability(rig: RigFile, key: str) -> RigFile:
         holder[last] = ""
         if table == "model":
             del holder[last]
-    elif last in ("path", "injection", "motion", "loop_injection", "hold", "coil_map"):
+    elif last in ("path", "injection", "motion", "loop_injection", "hold", "coil_map", "positioning", "phase_test"):
         holder[last] = None
     elif key == "set_points" or holder is content or isinstance(holder[last], dict):
         holder[last] = {}
