@@ -15,6 +15,7 @@ from bench.cli.truths import (
     coils,
     delays,
     emf,
+    friction,
     gate,
     held,
     linear_rotary,
@@ -75,4 +76,5 @@ TRUTHS: Mapping[str, Callable[[Any], Found]] = {
     "coil-map": coils.shares,
     "gate-margin": gate.margins,
     "bearing-constant": weights.constants,
+    "axis-friction": friction.of_axes,
 }

@@ -223,3 +223,11 @@ PULL_RATIO = (
     "to 0.66 µm.",
     "Force constants of both planes apart: no set point tells them, only what they have together.",
 )
+AXIS_FRICTION = (
+    "A weight that is not what its label says, or pulls the wrong way by both its pulleys: all friction by its share.",
+    "Friction that is not alike everywhere: results are means over the windows of the passes.",
+    "Friction that rises towards standstill (Stribeck): the line over the rates is told to no speed.",
+    "A map of the controller whose error grows with the force by more than saturation: what a newton is under the load is "
+    "taken for what it is without.",
+    "Time is the controller's: a clock that is fast by 1e-4 makes viscous friction greater by that share.",
+)
