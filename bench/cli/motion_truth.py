@@ -77,4 +77,5 @@ TRUTHS: Mapping[str, Callable[[Any], Found]] = {
     "gate-margin": gate.margins,
     "bearing-constant": weights.constants,
     "axis-friction": friction.of_axes,
+    "axis-inertia": friction.inertia,
 }

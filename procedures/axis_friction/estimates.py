@@ -24,7 +24,6 @@ from procedures.stages.spread import turns
 
 Array = npt.NDArray[np.float64]
 COULOMB, VISCOUS, BIAS, RADIUS = "coulomb", "viscous", "one_sided", "friction_radius"
-INDEPENDENT = 2  # of the phases that share a force, so that their mean is the nearer to that of all
 UNITS = {COULOMB: ("N", "N m"), VISCOUS: ("N s/m", "N m s/rad"), BIAS: ("N", "N m")}
 
 
@@ -124,7 +123,7 @@ def results(passes: Sequence[Pass], rig: RigFile, plan: Plan) -> Result:
     told = _solved(data, sizes, whole)
     each = fit.pseudo([_vector(_solved(data, sizes, np.delete(whole, k))) for k in whole], _vector(told))
     shares = _by_certificates(data, plan, inputs)
-    bends = _by_doubts(passes, rig, plan, sizes, _vector(told)) | _by_pairs(told)
+    bends = _by_doubts(passes, rig, plan, sizes, _vector(told))
     out = {}
     for k, (name, where) in enumerate(_names(data)):
         value, unit = float(_vector(told)[k]), _unit(name, where, data)
@@ -169,7 +168,7 @@ def _solved(data: Data, sizes: Mapping[str, tuple[float, float]], take: fit.Take
 
 def _inputs(data: Data, rig: RigFile, plan: Plan) -> dict[str, Estimate]:
     """Certificates of the loads; of an axis without them, the tolerance of the controller's map, for each way of its own."""
-    out = {}
+    out: dict[str, Estimate] = {}
     for name, axis in data.of.items():
         if data.sources[name]:
             out |= load_inputs(rig, data.sources[name], (mass(axis, plan),))
@@ -205,26 +204,6 @@ def _by_certificates(data: Data, plan: Plan, inputs: dict[str, Estimate]) -> dic
 
     found = propagate(model, inputs)
     return {n: found["@".join(n)] for n in names}
-
-
-def _by_pairs(r: Result) -> dict[Influence, Array]:
-    """Sensitivities (q,) of the results to the scale of the map in helices: where both axes are asked for, other phases share
-    out than where one is, and the scale there may be off that alone by as much as it differs from place to place."""
-    out: dict[Influence, Array] = {}
-    if r.data.helix is None or r.data.pair is None or r.acted is None or r.radius is None:
-        return out
-    one, other = (r.friction[a.name] for a in r.data.pair)
-    for k, axis in enumerate(r.data.pair):
-        u = fit.spread(r.data.axes[axis.name]) / math.sqrt(INDEPENDENT)
-        if u > 0:
-            forces = (r.acted[0] * (1 + u * (k == 0)), r.acted[1] * (1 + u * (k == 1)))
-            name = f"scale of the map where both axes move, {axis.name}"
-            moved = fit.radius_of(r.data.helix, forces, one, other) - r.radius
-            influence = Influence(
-                f"pairs/{axis.name}", name, u, "1", "B", "normal", source="scales from place to place"
-            )
-            out[influence] = np.array([*np.zeros(len(_vector(r)) - 1), moved]) / u
-    return out
 
 
 def _by_doubts(

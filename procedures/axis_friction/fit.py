@@ -102,15 +102,6 @@ def helix_forces(h: Helix, scales: tuple[float, float], take: Take) -> tuple[Arr
     return scales[0] * h.along[take].mean(axis=0), scales[1] * h.around[take].mean(axis=0)
 
 
-def spread(a: Axis) -> float:
-    """Standard deviation of the map's scale from place to place and from one way to the other, as a share."""
-    if not a.down.size:
-        return 0.0
-    both = np.concatenate([a.down / a.down.mean(), a.up / a.up.mean()])
-    apart = (a.down.mean() + a.up.mean()) / (a.down.mean() - a.up.mean())
-    return float(np.hypot(both.std(ddof=2), apart))
-
-
 def misfit(
     h: Helix, forces: tuple[Array, Array], along: Friction, around: Friction, radius: float
 ) -> tuple[Array, Array]:

@@ -231,3 +231,9 @@ AXIS_FRICTION = (
     "taken for what it is without.",
     "Time is the controller's: a clock that is fast by 1e-4 makes viscous friction greater by that share.",
 )
+AXIS_INERTIA = (
+    "A part that is not what its certificate says, or turns about another axis than the shaft: results by its share.",
+    "Something beside the part that is put on with it, as screws: their share of the part.",
+    "Friction that goes with the place: what is in phase with it there is taken for inertia.",
+    "Time is the controller's: it is the same with and without the part, and falls out.",
+)

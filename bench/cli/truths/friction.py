@@ -1,4 +1,4 @@
-"""Truths of a stage's friction: the machine's own, by axis."""
+"""Truths of a stage's axes: the machine's own friction, mass and inertia."""
 
 from __future__ import annotations
 
@@ -27,3 +27,12 @@ def of_axes(done: Simulated) -> Found:
             yield named(name, axis), axis.name, true[own[around]]
         yield named("one_sided", axis), axis.name, 0.0 if around else true["F_c"] * drawn["coulomb_sides"] + lifted
     yield "friction_radius", "", true["r_b"]
+
+
+def inertia(done: Simulated) -> Found:
+    """What each axis moves without a part."""
+    from procedures.axis_inertia.estimates import named
+    from procedures.axis_inertia.sequence import chosen
+
+    for axis in chosen(done.recording.rig, done.recording.plan):
+        yield named(axis), axis.name, done.truth["J" if axis.unit == "rad" else "m"]
