@@ -215,7 +215,7 @@ def test_a_drawn_machine(tmp_path: Path) -> None:
     assert len(off(done)) == 7
     assert all(abs(x) < 1.5 for x in off(done).values()), off(done)
     drawn = list(figures(procedure.evaluated(done.recording).result, done.recording))
-    assert [f.id for f in drawn] == ["friction-x", "friction-angle", "helix"]
+    assert [f.key for f in drawn] == ["friction-x", "friction-angle", "helix"]
 
 
 def test_a_single_axis(tmp_path: Path) -> None:

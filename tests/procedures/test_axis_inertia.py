@@ -137,7 +137,7 @@ def test_refusals() -> None:
     assert procedure.lacking(RIG) == ()
     assert list(check(RIG, Plan())) == []
     assert "found y" in next(iter(check(RIG, Plan(axes=("y",)))))
-    assert "x_target" in next(iter(check(RIG, Plan(tones_m=((0.0136, 1.8), (1e-3, 4.0))))))
+    assert "x_amplitude" in next(iter(check(RIG, Plan(tones_m=((0.0136, 1.8), (1e-3, 4.0))))))
     bare = RIG.model_copy(update={"machine": {k: v for k, v in RIG.machine.items() if k != "added_mass"}})
     assert "found no added_mass" in next(iter(check(bare, Plan())))
     assert untold(RIG) == ()
