@@ -16,6 +16,7 @@ from bench.cli.truths import (
     delays,
     emf,
     following,
+    friction,
     gate,
     held,
     linear_rotary,
@@ -85,4 +86,6 @@ TRUTHS: Mapping[str, Callable[[Any], Found]] = {
     "positioning": positioned.figures,
     "map-zero": reluctance.zeros,
     "inductance-map": reluctance.inductances,
+    "axis-friction": friction.of_axes,
+    "axis-inertia": friction.inertia,
 }

@@ -262,3 +262,17 @@ FOLLOWING = (
     "Time is the controller's: a clock that is fast by 1e-4 makes times and lags shorter by that share.",
     "The machine as it is then: friction that changes by 10 % moves what is left without integrators by up to as much.",
 )
+AXIS_FRICTION = (
+    "A weight that is not what its label says, or pulls the wrong way by both its pulleys: all friction by its share.",
+    "Friction that is not alike everywhere: results are means over the windows of the passes.",
+    "Friction that rises towards standstill (Stribeck): the line over the rates is told to no speed.",
+    "A map of the controller whose error grows with the force by more than saturation: what a newton is under the load is "
+    "taken for what it is without.",
+    "Time is the controller's: a clock that is fast by 1e-4 makes viscous friction greater by that share.",
+)
+AXIS_INERTIA = (
+    "A part that is not what its certificate says, or turns about another axis than the shaft: results by its share.",
+    "Something beside the part that is put on with it, as screws: their share of the part.",
+    "Friction that goes with the place: what is in phase with it there is taken for inertia.",
+    "Time is the controller's: it is the same with and without the part, and falls out.",
+)
