@@ -65,6 +65,7 @@ PROCEDURES = (
     _room("sensor-delay", "How late positions are read, by their phase against the currents that push"),
     _room("emf-constant", "Flux and emf constants of a mover's motors, and what the nameplate's flux is meant of"),
     _room("coil-map", "Coils, phases and actuators: is each where the controller takes it to be?"),
+    _room("load-response", "Static compliance, friction, deviation and return of a positioned stage under known loads"),
     _room("axis-friction", "Friction of a stage's axes, alone and where both move, by known loads"),
     _room("axis-inertia", "Mass and moment of inertia of what a stage moves, by sines and a known part"),
     _room("force-map", "Terms of the motor's force over displacement, currents and load"),

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.rigfile import RigFile
+from sim_backend.motion_loads import LoadsAsked
 
 Numbers = Mapping[str, float]
 Complex = npt.NDArray[np.complex128]
@@ -254,6 +255,7 @@ class Motions:
         pulls: of where a channel along and one around read, what holds a shaft that magnets pull, by quantity and where.
         cogging: harmonics of it along and around, by quantity and where, of a shaft turned at rad/s at a place, m.
         runout: what turns with the shaft, vectors by quantity, plane and place along, m.
+        loads: compliance, friction, scale of the force and answers to loads, by quantity and where.
         speeds: at the torque limit, by sharing: `speed` rad/s, `bound` A of the torque current, `ripple` rad/s.
     """
 
@@ -279,6 +281,7 @@ class Motions:
     ) = None
     pulls: Callable[[RigFile, Any, float, float], Mapping[tuple[str, str], float]] | None = None
     cogging: Callable[[RigFile, Any, float, float], Mapping[tuple[str, str], float]] | None = None
+    loads: Callable[[RigFile, Any, LoadsAsked], Mapping[tuple[str, str], float]] | None = None
     runout: Callable[[RigFile, Any, Sequence[float]], Mapping[tuple[str, str, float], complex]] | None = None
 
 

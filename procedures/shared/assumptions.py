@@ -223,6 +223,14 @@ PULL_RATIO = (
     "to 0.66 µm.",
     "Force constants of both planes apart: no set point tells them, only what they have together.",
 )
+LOAD_RESPONSE = (
+    "An error that is common to all masses or to both arms, the same share of each, changes compliance and scale of the force "
+    "by that share. One mass that is off by as little as the plan's max_apart lets pass changes them by up to two thirds of "
+    "that.",
+    "A pulley whose friction differs by its direction: half of the difference acts as a load that is as much less.",
+    "Places other than the one where the axes stood: the force's scale is that of the map there.",
+    "Deviations are those that the axis' own encoder reads; where its zero lies nothing here can show.",
+)
 AXIS_FRICTION = (
     "A weight that is not what its label says, or pulls the wrong way by both its pulleys: all friction by its share.",
     "Friction that is not alike everywhere: results are means over the windows of the passes.",

@@ -13,8 +13,10 @@ from sim_backend.machines.rlsrm.defects import DEFECTS, NAMES
 from sim_backend.machines.rlsrm.device import CHANNELS, SETTABLE, Built, Sensed, StagePlant
 from sim_backend.machines.rlsrm.operator import Attendant
 from sim_backend.machines.rlsrm.params import DEG, ControlParams, Each, Map, PlantParams
-from sim_backend.machines.rlsrm.plant import LOOP_TICKS, READINGS, TICKS_S
+from sim_backend.machines.rlsrm.plant import LOOP_TICKS, TICKS_S
+from sim_backend.machines.rlsrm.served import READINGS
 from sim_backend.machines.rlsrm.states import states
+from sim_backend.machines.rlsrm.truth_load import loads
 from sim_backend.motion import Motions
 
 EACH: Final = {"phase_gain": NAMES, "resistance_spread": NAMES, "stator_zero": ("1", "2")}
@@ -62,7 +64,7 @@ def params(v: Numbers, d: Numbers) -> Built:
         thermal_resistance=v["thermal_resistance"], thermal_capacity=v["thermal_capacity"],
     )  # fmt: skip
     sensed = Sensed(
-        current_gain=_each(v, "i_{}.gain"), current_offset=_each(v, "i_{}.offset"),
+        current_gain=_gains(v, d), current_offset=_each(v, "i_{}.offset"),
         voltage_gain=_each(v, "u_{}.gain"), voltage_offset=_each(v, "u_{}.offset"), current_noise=v["current_noise"],
         voltage_noise=v["voltage_noise"], told=_each(d, "told_factor_{}"), cold=d["cold_told"],
     )  # fmt: skip
@@ -105,15 +107,20 @@ def _moved(v: Numbers, d: Numbers) -> dict[str, Any]:
 
 def _driven(v: Numbers, d: Numbers) -> dict[str, Any]:
     """Windings and amplifiers."""
-    gains, factors = _each(v, "i_{}.gain"), _each(d, "current_factor_{}")
     return {
         "resistance": tuple(v["machine.resistance"] * (1 + share) for share in _each(v, "resistance_spread_{}")),
         "supply": v["supply_V"],
         "share": _each(d, "voltage_share_{}"),
-        "current_gain": tuple(gain * factor for gain, factor in zip(gains, factors, strict=True)),
+        "current_gain": _gains(v, d),
         "current_offset": _each(v, "i_{}.offset"),
         "wired": _wired(d),
     }
+
+
+def _gains(v: Numbers, d: Numbers) -> Each:
+    """Of the amplifiers' own sensors, which their loops and the host read."""
+    both = zip(_each(v, "i_{}.gain"), _each(d, "current_factor_{}"), strict=True)
+    return tuple(gain * factor for gain, factor in both)
 
 
 def _wired(d: Numbers) -> Each:
@@ -175,5 +182,6 @@ RLSRM = Machine(
     name="rlsrm", stated=stated, defects=DEFECTS, params=params, quantities=quantities, targets=TARGETS, make=make,
     radial=slice(0, 0), integral_gains=frozenset(("ki_x", "ki_angle")), turns=False, channels=CHANNELS, places=places,
     spoil=spoil, supply_V=90.0, windings={}, copper_W=copper_W, operator=operator, traced=lambda _: READINGS, daily=DAILY,
-    controls=SETTABLE, levitates=False, tick_s=1 / TICKS_S, period_s=LOOP_TICKS / TICKS_S, motions=Motions(), states=states,
+    controls=SETTABLE, levitates=False, tick_s=1 / TICKS_S, period_s=LOOP_TICKS / TICKS_S, states=states,
+    motions=Motions(loads=loads),
 )  # fmt: skip
