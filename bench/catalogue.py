@@ -67,6 +67,10 @@ PROCEDURES = (
     _room("map-zero", "Zeros of a reluctance machine's stators against its encoder, from both sides"),
     _room("inductance-map", "Map of a reluctance machine's inductances, by pulses at a locked rotor"),
     _room("coil-map", "Coils, phases and actuators: is each where the controller takes it to be?"),
+    _room("load-response", "Static compliance, friction, deviation and return of a positioned stage under known loads"),
+    _room("positioning", "Repeatability and accuracy of positioning after ISO 230-2, by a reference instrument"),
+    _room("step-following", "Steps of a positioned stage: static error, overshoot, settling"),
+    _room("sine-following", "Sines that a positioned stage follows: errors, amplitude ratio, lag"),
     _room("force-map", "Terms of the motor's force over displacement, currents and load"),
 )
 

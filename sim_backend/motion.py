@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.rigfile import RigFile
+from sim_backend.motion_loads import LoadsAsked
 
 Numbers = Mapping[str, float]
 Complex = npt.NDArray[np.complex128]
@@ -229,6 +230,42 @@ class GateAsked:
 
 
 @dataclass(frozen=True)
+class StageWindow:
+    """Rows of telemetry in which an axis of a positioned stage is looked at, counted from the search of its zeros on, and what
+    the result is called; of a step where it is sent from and to, m or rad."""
+
+    axis: str
+    where: str
+    begin: int
+    end: int
+    places: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class StepsFollowed:
+    """Axes of a positioned stage that are sent to and fro: `settings` as those of steps; `commands` as (tick, command or
+    parameter, value) from the search of the zeros on, `windows` from the row before a set point starts until the step's end.
+    How many rows are to rest at its end; the band of settling, share of the step."""
+
+    settings: Numbers
+    commands: Sequence[tuple[int, str, float]]
+    windows: Sequence[StageWindow]
+    rest_rows: int
+    band: float
+
+
+@dataclass(frozen=True)
+class SinesFollowed:
+    """Axes of a positioned stage that follow sines: `settings` and `commands` as those of steps that are followed; `windows` of
+    whole periods, and the rows of a period."""
+
+    settings: Numbers
+    commands: Sequence[tuple[int, str, float]]
+    windows: Sequence[StageWindow]
+    period_rows: int
+
+
+@dataclass(frozen=True)
 class Motions:
     """The truths of motion of one machine; None: it has none of that kind. Each takes the rig and what was drawn for it (a
     `Truth`) first.
@@ -253,7 +290,9 @@ class Motions:
         gates: what the gate and the catch have to spare, by quantity and where.
         pulls: of where a channel along and one around read, what holds a shaft that magnets pull, by quantity and where.
         cogging: harmonics of it along and around, by quantity and where, of a shaft turned at rad/s at a place, m.
+        following: what axes do that are sent to and fro or follow sines, by quantity and where.
         runout: what turns with the shaft, vectors by quantity, plane and place along, m.
+        loads: compliance, friction, scale of the force and answers to loads, by quantity and where.
         inductances: constants of a map of inductances, as encoders read places, by quantity and where.
         stators: where phases draw the shaft, by quantity and where.
         speeds: at the torque limit, by sharing: `speed` rad/s, `bound` A of the torque current, `ripple` rad/s.
@@ -281,8 +320,10 @@ class Motions:
     ) = None
     pulls: Callable[[RigFile, Any, float, float], Mapping[tuple[str, str], float]] | None = None
     cogging: Callable[[RigFile, Any, float, float], Mapping[tuple[str, str], float]] | None = None
+    loads: Callable[[RigFile, Any, LoadsAsked], Mapping[tuple[str, str], float]] | None = None
     inductances: Callable[[RigFile, Any], Mapping[tuple[str, str], float]] | None = None
     stators: Callable[[RigFile, Any], Mapping[tuple[str, str], float]] | None = None
+    following: Callable[[RigFile, Any, StepsFollowed | SinesFollowed], Mapping[tuple[str, str], float]] | None = None
     runout: Callable[[RigFile, Any, Sequence[float]], Mapping[tuple[str, str, float], complex]] | None = None
 
 
