@@ -160,7 +160,7 @@ def _leakage(r: Result, rig: RigFile, plan: Plan) -> Iterator[Finding]:
     alone: a phase that has more of it has another gain."""
     at = Terms(len(r.rows.x))
     slices = at.each("leakage"), at.each("saturation")
-    product = math.prod(r.found.terms[s] for s in slices)
+    product = r.found.terms[slices[0]] * r.found.terms[slices[1]]
     scatter = np.hypot(*(np.sqrt(np.diag(r.found.scatter))[s] / r.found.terms[s] for s in slices))
     share = product / product.mean() - 1
     for k, p in enumerate(r.phases):
