@@ -65,6 +65,7 @@ PROCEDURES = (
     _room("sensor-delay", "How late positions are read, by their phase against the currents that push"),
     _room("emf-constant", "Flux and emf constants of a mover's motors, and what the nameplate's flux is meant of"),
     _room("coil-map", "Coils, phases and actuators: is each where the controller takes it to be?"),
+    _room("decoupling", "Decoupling of a stage's axes: what a held one does, and what force crosses over to it"),
     _room("force-map", "Terms of the motor's force over displacement, currents and load"),
 )
 

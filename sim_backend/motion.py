@@ -229,6 +229,22 @@ class GateAsked:
 
 
 @dataclass(frozen=True)
+class DecouplingAsked:
+    """An axis of a stage that is `moved` through a sine while another one is `held` at its zero: `settings` as those of steps,
+    `amplitude` m or rad, how many `periods` are looked at after one, above which share of its greatest speed it counts as
+    `sliding`, and the frequency, Hz, at which the smoothed force has half of what it was."""
+
+    settings: Numbers
+    moved: str
+    held: str
+    amplitude: float
+    period_s: float
+    periods: int
+    sliding: float
+    smooth_hz: float
+
+
+@dataclass(frozen=True)
 class Motions:
     """The truths of motion of one machine; None: it has none of that kind. Each takes the rig and what was drawn for it (a
     `Truth`) first.
@@ -254,6 +270,8 @@ class Motions:
         pulls: of where a channel along and one around read, what holds a shaft that magnets pull, by quantity and where.
         cogging: harmonics of it along and around, by quantity and where, of a shaft turned at rad/s at a place, m.
         runout: what turns with the shaft, vectors by quantity, plane and place along, m.
+        decoupling: of an axis that is held, its largest `excursion` and the moved one's `swing`, effective value `cross`, `peak`
+            and `slope` of what crosses over.
         speeds: at the torque limit, by sharing: `speed` rad/s, `bound` A of the torque current, `ripple` rad/s.
     """
 
@@ -280,6 +298,7 @@ class Motions:
     pulls: Callable[[RigFile, Any, float, float], Mapping[tuple[str, str], float]] | None = None
     cogging: Callable[[RigFile, Any, float, float], Mapping[tuple[str, str], float]] | None = None
     runout: Callable[[RigFile, Any, Sequence[float]], Mapping[tuple[str, str, float], complex]] | None = None
+    decoupling: Callable[[RigFile, Any, DecouplingAsked], Mapping[str, float]] | None = None
 
 
 NONE = Motions()
