@@ -94,6 +94,8 @@ class Machine:
             then.
         motions: what it truly does under a plan.
         tick_s, period_s: of its controller, and from sample to sample of its telemetry.
+        states: its controller's states in the place of `sim_backend.controller.states.States`, of plant, machine, the
+            controller's own parameters, the owner and a planted fault's time.
         controller: what speaks for it, of rig file, truth, faults in the device and integration steps in a tick; None: the
             `SimulatedController` around its plant.
         served: what stands behind real ports; None: the `SimulatedController`, too.
@@ -122,6 +124,7 @@ class Machine:
     controls: frozenset[str] = frozenset()
     motions: Motions = NONE
     levitates: bool = True
+    states: Callable[..., Any] | None = None
     tick_s: float = TICK_S
     period_s: float = PERIOD_TICKS * TICK_S
     controller: Callable[[RigFile, Truth, Sequence[Fault], int], Any] | None = None

@@ -19,7 +19,7 @@ from sim_backend.controller.device_faults import DeviceFaults
 from sim_backend.controller.ownership import Ownership
 from sim_backend.controller.parameters import Parameters
 from sim_backend.controller.requests import MAP_VERSION, Requests
-from sim_backend.controller.states import MOVING, States
+from sim_backend.controller.states import States
 from sim_backend.controller.telemetry import Span, TelemetryEncoder
 from sim_backend.core import Array
 from sim_backend.machine import TracedPlant, Truth
@@ -120,7 +120,8 @@ class SimulatedController:
         self._owner = Ownership(heartbeat=self.plant.tick, tick_s=self.plant.tick_s)
         self.parameters = Parameters(self._rig, self.truth, self.plant, strict=self._own_words)
         planted_s = self.truth.defects["fault_after_s"]
-        self.states = States(self.plant, self._machine, self.parameters.own, self._owner, planted_s)
+        states = self._machine.states or States
+        self.states: States = states(self.plant, self._machine, self.parameters.own, self._owner, planted_s)
         traced = self._machine.traced(self.truth.defects)
         self.captures = None
         if self._rig.capture is not None and traced:
@@ -150,10 +151,11 @@ class SimulatedController:
             if self.states.watching:
                 deadline = owner.heartbeat + int(self.parameters.own["watchdog_s"] / plant.tick_s) + 1
                 until = min(tick, deadline) if deadline > before else tick
-            if self.state in MOVING:
+            if self.states.stepwise:
                 until = min(until, before + 10 * plant.period_ticks)
+            self.states.begin()
             rows = self._advanced(until - before)
-            self._spans.append(Span(rows, before, self.state, self.fault, owner.heartbeat, owner.armed))
+            self._spans.extend(self.states.spans(rows, before))
             before = plant.tick
             self.states.progress(rows)
 

@@ -23,8 +23,8 @@ rotor as this one does. So LEVITATED is never told before the rotor stands, nor 
 
 
 def state_codes(binding: Binding, choices: Mapping[int, str]) -> dict[str, int]:
-    """The code that tells each mode of what levitates, or of a stage: of several states that mean it the one with the lowest number, of none the nearest
-    mode's (NEAREST), and where that has none either the lowest code."""
+    """The code that tells each mode of what levitates, or of a stage: of several states that mean it the one with the lowest
+    number, of none the nearest mode's (NEAREST), and where that has none either the lowest code."""
     told: dict[str, int] = {}
     for code in sorted(choices):
         mode = binding.mode(choices[code])
@@ -32,7 +32,7 @@ def state_codes(binding: Binding, choices: Mapping[int, str]) -> dict[str, int]:
             told.setdefault(mode, code)
     lowest = min(told.values(), default=0)
     modes = STAGE_MODES if "HOLDING" in told else LEVITATION_MODES
-    near = {m: next((told[n] for n in NEAREST[m] if n in told), lowest) for m in modes if m not in told}
+    near = {m: next((told[n] for n in NEAREST.get(m, ()) if n in told), lowest) for m in modes if m not in told}
     return told | near
 
 

@@ -18,7 +18,7 @@ from sim_backend.controller.capture_port import CapturePort
 from sim_backend.controller.meanings import state_codes
 from sim_backend.controller.ownership import Ownership
 from sim_backend.controller.parameters import Parameters
-from sim_backend.controller.states import AT_REST, RESTING, States
+from sim_backend.controller.states import States
 
 MAP_VERSION: Final = 2
 THE_HOST: Final = 1  # session of a host whose messages have none
@@ -87,7 +87,7 @@ class Requests:
 
     @property
     def _resting(self) -> bool:
-        return self._states.state in AT_REST
+        return self._states.at_rest
 
     def _heartbeat(self, v: Values, _: Tell) -> None:
         whose = int(v["session"]) if "session" in v else None
@@ -105,7 +105,7 @@ class Requests:
             return
         before = self._parameters.own["speed_ref"]
         for name, value in changes.items():
-            self._parameters.set(name, value, True, self._states.state in RESTING)
+            self._parameters.set(name, value, True, self._states.resting)
         for name in commands:
             self._obey(name)
         if self._spinning and self._parameters.own["speed_ref"] != before and "SPIN" in self._commands.standing:
@@ -138,7 +138,7 @@ class Requests:
     def _set(self, v: Values, tell: Tell) -> None:
         index = int(v["index"])
         mine = self._owner.may_write(int(v["session8"])) if "session8" in v else True
-        answer = self._parameters.write(index, v["value"], mine, self._states.state in RESTING)
+        answer = self._parameters.write(index, v["value"], mine, self._states.resting)
         self._reply(index, answer, v, tell)
 
     def _get(self, v: Values, tell: Tell) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from sim_backend import core
 from sim_backend.controller import setdown
 from sim_backend.controller.ownership import Ownership
+from sim_backend.controller.telemetry import Span
 from sim_backend.machine import Machine, SimulatedPlant
 
 SETTLED_M, SETTLED_S = 20e-6, 0.05
@@ -55,6 +56,28 @@ class States:
         plant.mode = core.OFF
         plant.clear_trips()
         self._brake()
+
+    @property
+    def resting(self) -> bool:
+        """Whether it holds no rotor."""
+        return self.state in RESTING
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether another host may take it over."""
+        return self.state in AT_REST
+
+    @property
+    def stepwise(self) -> bool:
+        """Whether a movement's end must be looked for every few periods."""
+        return self.state in MOVING
+
+    def begin(self) -> None:
+        """Before time passes."""
+
+    def spans(self, rows: core.Array, first_tick: int) -> list[Span]:
+        """Rows of the plant, which ran in one state."""
+        return [Span(rows, first_tick, self.state, self.fault, self._owner.heartbeat, self._owner.armed)]
 
     @property
     def watching(self) -> bool:

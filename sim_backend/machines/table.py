@@ -8,12 +8,13 @@ from sim_backend.machine import Machine
 from sim_backend.machines.amb1dof.machine import AMB1DOF
 from sim_backend.machines.amb5dof.machine import AMB5DOF
 from sim_backend.machines.lira.machine import LIRA
+from sim_backend.machines.rlsrm.machine import RLSRM
 from sim_backend.machines.tsbs.machine import TSBS
 from sim_backend.machines.tsbs.six import TSBS6
 from sim_backend.machines.twin.machine import TWIN, twin
 
 OF_TSBS = "slope_i"  # that no simulated TSBS can be without
-MACHINES = {machine.name: machine for machine in (TSBS, TSBS6, AMB5DOF, AMB1DOF, LIRA)}
+MACHINES = {machine.name: machine for machine in (TSBS, TSBS6, AMB5DOF, AMB1DOF, LIRA, RLSRM)}
 
 
 def machine_of(rig: RigFile) -> Machine:

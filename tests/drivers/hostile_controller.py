@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from bench.cli.safety import making_safe
+from bench.cli.stage_safety import making_stage_safe
 from bench.findings import Finding
 from bench.link import Link, LinkStats
 from bench.link.codec import Decoder, encode
@@ -70,7 +71,16 @@ class Bench:
         self.controller = Controller(rig, self.link, self.base, Session(1, 1_767_225_600, "test"))
         self.controller.connect()
         self.controller.enable()
-        self.controller.levitate()
+        self.hold()
+
+    def hold(self) -> None:
+        """Lift it, or hold the axes of what does not levitate."""
+        c = self.controller
+        if c.stage is None:
+            c.levitate()
+        else:
+            c.stage.home()
+            c.stage.hold()
 
     def made_safe(self, change: Change, before_s: float = 1.5) -> tuple[tuple[Finding, ...], float]:
         """After so long of changed telemetry: findings, and how long it took by the bench's time."""
@@ -79,7 +89,10 @@ class Bench:
         self.controller.clock.sleep(before_s)
         self.link.commands.clear()
         begin = self.machine.now_ns()
-        steps, aftermath = making_safe(self.controller, self.base)
+        if self.controller.stage is None:
+            steps, aftermath = making_safe(self.controller, self.base)
+        else:
+            steps, aftermath = making_stage_safe(self.controller, self.base)
         found = self.supervisor.make_safe(steps, self.machine.now_ns) + aftermath()
         return found, (self.machine.now_ns() - begin) * 1e-9
 

@@ -11,6 +11,7 @@ void rlsrm_amplifiers(const rlsrm_params *p, const rlsrm_control *c, rlsrm_state
     for (int k = 0; k < PHASES; k++) {
         int winding = (int)p->wired[k];
         double wanted = st->on ? st->wanted[k] : 0, i = st->i[winding];
+        if (st->pulse_left > 0 && st->pulse_phase == k) wanted = c->current_max;
         if (wanted == 0 && i == 0) {
             st->summed[k] = u[winding] = 0;
             continue;

@@ -16,6 +16,8 @@ int64_t rlsrm_counted(const rlsrm_params *p, const rlsrm_state *st, int k) {
     return (int64_t)floor(seen(p, st, k) / p->pitch[k] + p->edge[k] + (p->truncate[k] != 0 ? 0 : 0.5));
 }
 
+static double kept_share(double hz) { return hz > 0 ? 1 - exp(-TWO_PI * hz * LOOP_S) : 1; }
+
 static int64_t below(int64_t a, int64_t every) { return a / every - (a % every < 0); }
 
 /* a mark that goes by between two readings is latched with its count; the rotary one comes once a turn */
@@ -39,6 +41,7 @@ static void read_counts(const rlsrm_params *p, const rlsrm_control *c, rlsrm_sta
         int64_t count = rlsrm_counted(p, st, k) - st->base[k];
         if (st->mode == RLSRM_HOMING && !st->homed[k]) mark(p, st, k, st->count[k], count);
         st->rate_read[k] = (double)(count - st->count[k]) * c->pitch[k] / LOOP_S;
+        st->rate_slow[k] += kept_share(c->cut[k]) * (st->rate_read[k] - st->rate_slow[k]);
         st->count[k] = count;
         st->read[k] = (double)(count - st->home[k]) * c->pitch[k];
     }
@@ -46,10 +49,12 @@ static void read_counts(const rlsrm_params *p, const rlsrm_control *c, rlsrm_sta
 
 static double wave(const rlsrm_control *c, int k, double t) {
     double turn = c->wave[k] != 0 ? t / c->period[k] + c->phase[k] : 0;
-    if (c->wave[k] == 1) return c->offset[k] + c->amplitude[k] * sin(TWO_PI * turn);
-    if (c->wave[k] == 2) return c->offset[k] + (turn - floor(turn) < 0.5 ? c->amplitude[k] : -c->amplitude[k]);
-    return c->offset[k];
+    if (c->wave[k] == 1) return c->amplitude[k] * sin(TWO_PI * turn);
+    if (c->wave[k] == 2) return turn - floor(turn) < 0.5 ? c->amplitude[k] : -c->amplitude[k];
+    return 0;
 }
+
+static int in_sine(const rlsrm_control *c, const rlsrm_state *st, int k) { return st->waves && c->wave[k] == 1; }
 
 /* to the target by a speed and an acceleration at most. Braking in steps of h from v covers v^2/2a + v h/2, so that
  * v = sqrt(2 a d + (a h/2)^2) - a h/2 still comes to rest there. */
@@ -71,14 +76,19 @@ static void refer(const rlsrm_control *c, rlsrm_state *st, int k, double target)
     st->ref[k] += rate * LOOP_S;
 }
 
-static double kept_share(double hz) { return hz > 0 ? 1 - exp(-TWO_PI * hz * LOOP_S) : 1; }
+/* a sine is given, not sent; its rate is what a stop brakes from */
+static void give(rlsrm_state *st, int k, double place) {
+    st->ref_rate[k] = (place - st->ref[k]) / LOOP_S;
+    st->ref[k] = place;
+}
 
 /* what loop k wants; `grown` is its integral, should it take this reading in */
 static double wanted(const rlsrm_control *c, rlsrm_state *st, int k, double *grown) {
     double error = st->ref[k] - st->read[k], change = st->fresh ? 0 : (error - st->error[k]) / LOOP_S;
     st->slope[k] += kept_share(c->cut[k]) * (change - st->slope[k]);
     st->error[k] = error;
-    int waits = (c->wait >= 1 && c->speed[k] > 0 && st->ref_rate[k] != 0) || (c->wait == 2 && c->wave[k] == 1);
+    int sent = c->speed[k] > 0 && st->ref_rate[k] != 0 && !in_sine(c, st, k);
+    int waits = (c->wait >= 1 && sent) || (c->wait == 2 && c->wave[k] == 1);
     *grown = st->integral[k] + (waits ? 0 : c->ki[k] * error * LOOP_S);
     return c->kp[k] * error + *grown + c->kd[k] * st->slope[k];
 }
@@ -97,7 +107,9 @@ void rlsrm_loops(const rlsrm_params *p, const rlsrm_control *c, const rlsrm_read
     read_counts(p, c, st);
     rlsrm_supervise(p, c, st);
     for (int k = 0; k < 2; k++) {
-        refer(c, st, k, st->mode == RLSRM_OFF || (st->waves && c->wave[k] != 0) ? wave(c, k, t) : st->target[k]);
+        if (st->mode == RLSRM_OFF) refer(c, st, k, c->offset[k] + wave(c, k, t));
+        else if (in_sine(c, st, k)) give(st, k, st->target[k] + wave(c, k, t));
+        else refer(c, st, k, st->target[k] + (st->waves ? wave(c, k, t) : 0));
         if (st->loop[k]) want[k] = wanted(c, st, k, &grown[k]);
         st->asked[k] = clip(want[k], -c->limit[k], c->limit[k]);
     }

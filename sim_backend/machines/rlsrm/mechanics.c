@@ -13,7 +13,7 @@
 /* viscous friction by the trapezoidal rule */
 void rlsrm_ready_mover(const rlsrm_params *p, double seconds, rlsrm_mover *m) {
     for (int k = 0; k < 2; k++) {
-        double inertia = k == X ? p->mass : p->inertia, z = 0.5 * seconds * p->viscous[k] / inertia;
+        double inertia = (k == X ? p->mass : p->inertia) + p->added[k], z = 0.5 * seconds * p->viscous[k] / inertia;
         m->keep[k] = (1 - z) / (1 + z);
         m->gain[k] = 1 / (inertia * (1 + z));
     }

@@ -57,6 +57,10 @@ class PlantParams:
     locked: Pair = (0.0, 0.0)  # 1: clamped
     push: Pair = (0.0, 0.0)  # N, N m from outside, along +x and +angle
     tilt: float = 0.0  # rad, +x downwards
+    lock_give: Pair = (0.0, 0.0)  # m/N, rad/(N m): of what clamps
+    hung: Pair = (0.0, 0.0)  # N, N m of weights, along +x and +angle
+    hung_rate: Pair = (0.0, 0.0)  # N/s, N m/s by which they are let go
+    added: Pair = (0.0, 0.0)  # kg, kg m2 of what hangs
     gravity: float = 9.81
     stop: float = 15e-3  # m, of the bumpers; stand-in: past it a stator has lost the mover
     stop_stiffness: float = 2e5
@@ -125,4 +129,6 @@ class ControlParams:
     trip_m: float = 14.5e-3
     trip_rate: Pair = (0.5, 60.0)  # m/s, rad/s, by the difference of two readings
     trip_warm: float = 120.0  # degrees C
+    test_phase: float = 7.0  # in READY this phase alone carries `test_current`; beyond 5: none
+    test_current: float = 0.0  # A
     watchdog_s: float = 0.08

@@ -21,6 +21,8 @@ typedef struct {
     rlsrm_map map;
     double mass, inertia, viscous[2], coulomb, coulomb_angle, bearing_radius, along_path, coulomb_sides;
     double brake[2], locked[2], push[2], tilt, gravity; /* N, N m; 1: clamped; what acts from outside, along the axes; rad */
+    double lock_give[2];              /* m/N, rad/(N m): of what clamps */
+    double hung[2], hung_rate[2], added[2]; /* N, N m that are let go at N/s, N m/s; kg, kg m^2 that hang */
     double stop, stop_stiffness, stop_damping;
     double resistance[6], ambient, copper, thermal_resistance, thermal_capacity; /* ohm at 20 deg; deg C; 1/K; K/W; J/K */
     double supply, share[6];                               /* V; share of it that an amplifier can give */
@@ -43,6 +45,7 @@ typedef struct {
     double current_max, kp_i, ki_i, resistance, late; /* of the amplifiers: A, V/A, V/(A s), ohm fed forward; ticks */
     double home_current[2], home_s[2], home_rate, safe_holds; /* A, s of a step; m/s; 1: held after MAKE_SAFE */
     double trip_A, trip_m, trip_rate[2], trip_warm, watchdog_s; /* m of stroke; m/s, rad/s; degrees C */
+    double test_phase, test_current;                           /* READY: this phase alone carries so much; beyond 5: none */
 } rlsrm_control;
 
 typedef struct {
@@ -60,10 +63,16 @@ typedef struct {
     double target[2], rate_read[2], standing;
     int32_t mode, fault, homed[2], stage, stage_clock, waves, letting_go;
     int64_t heard; /* tick of the last heartbeat; -1: none is waited for */
+    double rate_slow[2], hanging[2], lock_at[2]; /* rates through the loops' filters; N, N m that hang; where it is clamped */
+    int32_t lock_shut[2], pulse_phase;
+    int64_t pulse_left; /* ticks of a pulse of the whole supply */
 } rlsrm_state;
 
 void rlsrm_start(const rlsrm_params *, rlsrm_state *);
 int64_t rlsrm_run(const rlsrm_params *, const rlsrm_control *, rlsrm_state *, int64_t ticks, double *trace, int64_t every);
+void rlsrm_serve(const rlsrm_params *, const rlsrm_control *, rlsrm_state *, int64_t ticks, double *rows, double *trace,
+                 int64_t every, int64_t shift);
+void rlsrm_fail(rlsrm_state *, int32_t fault);
 void rlsrm_slopes(const rlsrm_map *, const double *q, double *g, double *along, double *around);
 int32_t rlsrm_distribute(const rlsrm_control *, const double *q, const double *along, const double *around, const double *asked,
                          int32_t *pair, double *current, double *given);
@@ -77,11 +86,13 @@ void rlsrm_rub_once(const rlsrm_params *, rlsrm_state *, double seconds, const d
 #define LOOP_TICKS 20
 #define LOOP_S (RLSRM_TICK * LOOP_TICKS)
 #define RLSRM_TRACE 38
+#define RLSRM_ROW 22
+#define RLSRM_READINGS 16
 enum { X, ANGLE };
-enum { LIMITED = 1, NO_PAIR = 2 };
+enum { LIMITED = 1, NO_PAIR = 2, HOMED = 64 };
 enum { RLSRM_OFF, RLSRM_READY, RLSRM_HOMING, RLSRM_HOLDING, RLSRM_MOVING, RLSRM_STOPPING, RLSRM_FAULT };
-enum { DO_READY, DO_HOME, DO_HOLD, DO_PLAY, DO_STOP, DO_SAFE, DO_OFF, DO_CLEAR };
-enum { FAULT_NONE, FAULT_CURRENT, FAULT_SPEED, FAULT_STROKE, FAULT_WARM, FAULT_HOST };
+enum { DO_READY, DO_HOME, DO_HOLD, DO_PLAY, DO_STOP, DO_SAFE, DO_OFF, DO_CLEAR, DO_LET_GO };
+enum { FAULT_NONE, FAULT_CURRENT, FAULT_SPEED, FAULT_STROKE, FAULT_WARM, FAULT_HOST, FAULT_SENSOR };
 enum { REFUSED = 1, NOT_HOMED = 2 };
 
 /* a map made ready: of each phase the turn of four times its aligned angle, and Lam = base + swing h */

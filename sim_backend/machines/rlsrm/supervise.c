@@ -27,6 +27,7 @@ static void feed(rlsrm_state *st, double first, double second) {
 
 static void rest(rlsrm_state *st, int mode) {
     memset(st->manual, 0, sizeof st->manual);
+    st->pulse_left = 0;
     st->on = st->loop[X] = st->loop[ANGLE] = st->waves = 0;
     st->heard = -1;
     st->mode = mode;
@@ -36,6 +37,9 @@ static void trip(rlsrm_state *st, int fault) {
     rest(st, RLSRM_FAULT);
     st->fault = fault;
 }
+
+/* for faults that the core does not see by itself, and for tests of them */
+void rlsrm_fail(rlsrm_state *st, int32_t fault) { trip(st, fault); }
 
 /* loops closed where the mover is */
 static void take_hold(rlsrm_state *st) {
@@ -74,6 +78,7 @@ static void begin_home(rlsrm_state *st) {
 static void make_safe(const rlsrm_control *c, rlsrm_state *st) {
     if (moves(st)) brake(c, st, c->safe_holds == 0);
     else if (st->mode == RLSRM_HOMING) rest(st, RLSRM_READY);
+    st->heard = -1; /* nobody is waited for any more */
 }
 
 static int32_t done(int may) { return may ? 0 : REFUSED; }
@@ -96,12 +101,16 @@ int32_t rlsrm_command(const rlsrm_control *c, rlsrm_state *st, int32_t command) 
         if (st->mode != RLSRM_HOLDING) return REFUSED;
         st->waves = 1;
         st->wave_start = st->tick;
+        st->heard = st->tick;
         return 0;
     case DO_STOP:
         if (st->mode == RLSRM_HOMING) rest(st, RLSRM_READY);
         else if (held) brake(c, st, 0);
         return done(held || st->mode == RLSRM_READY);
     case DO_SAFE: make_safe(c, st); return 0;
+    case DO_LET_GO:
+        if (held) rest(st, RLSRM_READY);
+        return done(held);
     case DO_OFF:
         if (ready || st->mode == RLSRM_HOLDING) rest(st, RLSRM_OFF);
         return done(st->mode == RLSRM_OFF);
@@ -182,9 +191,20 @@ static void come_to_rest(rlsrm_state *st) {
     else st->mode = lost ? RLSRM_FAULT : RLSRM_HOLDING;
 }
 
+/* READY: one phase may carry a current by itself */
+static void test(const rlsrm_control *c, rlsrm_state *st) {
+    int k = c->test_phase >= 0 && c->test_phase < PHASES ? (int)c->test_phase : -1;
+    memset(st->manual, 0, sizeof st->manual);
+    st->on = k >= 0;
+    if (k >= 0) st->manual[k] = least(c->test_current, c->current_max);
+    if (k != st->pulse_phase) st->pulse_left = 0;
+}
+
 void rlsrm_supervise(const rlsrm_params *p, const rlsrm_control *c, rlsrm_state *st) {
     (void)p;
     if (st->mode == RLSRM_HOMING) home(c, st);
+    if (st->mode == RLSRM_READY) test(c, st);
+    else st->pulse_left = 0;
     if (moves(st)) come_to_rest(st);
     if (st->mode != RLSRM_OFF && st->on) watch(c, st); /* what is held in FAULT, too */
 }
