@@ -13,6 +13,7 @@ from bench.cli.truths import (
     actuator,
     cogging,
     coils,
+    decoupling,
     delays,
     emf,
     gate,
@@ -74,5 +75,6 @@ TRUTHS: Mapping[str, Callable[[Any], Found]] = {
     "runout-map": turning.runout,
     "coil-map": coils.shares,
     "gate-margin": gate.margins,
+    "decoupling": decoupling.crossed,
     "bearing-constant": weights.constants,
 }

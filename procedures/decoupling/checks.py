@@ -8,7 +8,7 @@ import numpy as np
 
 from bench.findings import Effect, Finding
 from bench.rigfile import RigFile
-from procedures.decoupling.estimates import Result, coupling_of, named, ratio_of, samples
+from procedures.decoupling.estimates import Result, coupling_of, excursion_of, named, ratio_of, samples
 from procedures.decoupling.plan import Plan
 from procedures.decoupling.steps import FAST, SLOW, Run
 from procedures.shared import signals
@@ -97,7 +97,7 @@ def _stuck(r: Result, plan: Plan) -> Iterator[Finding]:
             f"which it follows by {follow:.0%}; the cross force that the loop sees is {r.cross.peak:.2g} {force} at most. A force "
             "within the friction moves nothing, so that the excursion says nothing of the controller's map. Is a brake left on? "
             "Does the bearing rub each way alone?")  # fmt: skip
-    concerned = ("excursion" if held.unit == "m" else "excursion_angle", ratio_of(r.pair), *named(r.pair), coupling_of(r.pair))
+    concerned = (excursion_of(r.pair), ratio_of(r.pair), *named(r.pair), coupling_of(r.pair))
     yield Finding("stuck", text, r.pair.where, Effect.INDETERMINATE, tuple(f"{name}@{r.pair.where}" for name in concerned))
 
 

@@ -21,10 +21,9 @@ Array = npt.NDArray[np.float64]
 BOUND = 1.959964  # U over u: half a count is U, for an axis that is pushed rests at the edges of counts
 RECTANGLE = math.sqrt(3)
 DRAG_SHARE = 0.25  # half width: of the drag's part in a result, for it changes along the path
-CHANGES = 2.0  # of the reading in a period while the moved axis slides; with fewer nothing calls the loop
-SWINGS = 4.0  # counts a period: an axis that swings by half a count with the motion, unseen, takes pi
-STANDS = 30.0  # likewise where the reading stands: drag without the chatter that makes it less is three times as much, and it may
-# go through a count in a tenth of a period
+SWINGS = 6.0  # counts a period: an axis that swings by half a count with the motion, unseen, takes pi at its greatest
+STANDS = 30.0  # likewise where the reading stands: without the chatter that makes it less drag is three times as much, and an axis
+# may go through a count in a tenth of a period. The more often the reading changes, the more of it the loop asks for
 PEAK = 2.5  # of what is not seen, over its effective value
 
 
@@ -110,10 +109,15 @@ def _places(pair: Pair, excursion: float, peak: float) -> dict[str, Estimate]:
     half = Influence(f"rounding/{pair.where}", "rounding of the reading, half a count", _count(pair) / 2 / BOUND,
                      pair.held.unit, "B", "normal")  # fmt: skip
     largest = Estimate.of(excursion, half)
-    out = {"excursion" if pair.held.unit == "m" else "excursion_angle": largest}
+    out = {excursion_of(pair): largest}
     if peak > 0:
         out[ratio_of(pair)] = largest * (1 / peak)
     return out
+
+
+def excursion_of(pair: Pair) -> str:
+    """Which of the excursions a pair has."""
+    return "excursion" if pair.held.unit == "m" else "excursion_angle"
 
 
 def ratio_of(pair: Pair) -> str:
@@ -140,7 +144,7 @@ def _forces(pair: Pair, found: Cross, slow: Nudge, fast: Nudge, plan: Plan) -> d
     force, (rms, peak) = pair.held.force, named(pair)
     unseen = _unseen(pair, found, slow, fast, plan)
     per = 1 / found.other if found.other > 0 else 0.0
-    drags = [DRAG_SHARE * x for x in (abs(found.rms - found.plain), found.dragged, found.dragged * per / 2)]
+    drags = [DRAG_SHARE * x for x in (abs(found.rms - found.plain), 2 * found.dragged, found.dragged * per / 2)]
     wanted = ((rms, found.rms, force, unseen), (peak, found.peak, force, unseen * PEAK),
               (coupling_of(pair), found.slope, "", unseen * per))  # fmt: skip
     out = {}
@@ -159,7 +163,7 @@ def _unseen(pair: Pair, found: Cross, slow: Nudge, fast: Nudge, plan: Plan) -> f
     """What friction takes of a motion within a count."""
     drag = max(abs(n.drag) / n.speed for n in (slow, fast))
     share = drag * _count(pair) / plan.period_s
-    return (STANDS if found.changes < CHANGES else SWINGS) * share
+    return max(STANDS - found.changes, SWINGS) * share
 
 
 def _flat(known: str, name: str, half: float, unit: str) -> Influence:

@@ -22,7 +22,7 @@ from bench.rigfile.envelope import Envelope
 from bench.rigfile.stage import StageAxis, axes_of
 from procedures.decoupling import checks, estimates
 from procedures.decoupling import figures as drawn
-from procedures.decoupling.estimates import Result, coupling_of, named, ratio_of
+from procedures.decoupling.estimates import Result, coupling_of, excursion_of, named, ratio_of
 from procedures.decoupling.plan import Plan
 from procedures.decoupling.steps import ALONE, FAST, NUDGED, SLOW, SPARE_S, STATE, read_runs
 from procedures.shared import assumptions
@@ -81,22 +81,28 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     for name, value in plan.parameters.items():
         rig.motion.write({name: value})
     axes = axes_of(rig.file)
-    rig.motion.move({name: waits_at(axis) for name, axis in axes.items()})
     stiff = {f"stiffness_{name}": rig.motion.get(axis.stiffness) for name, axis in axes.items()}
     some = pairs(rig.file, plan.moved)
     for moved in {p.moved.name: p.moved for p in some}.values():
-        rig.clock.sleep(plan.settle_s)
+        _rest(rig, plan)
         with played(rig, motion_of(moved, plan)):
             rig.clock.sleep(plan.period_s)
             with record.step(ALONE, moved=moved.name, **stiff):
                 rig.clock.sleep(plan.periods * plan.period_s + SPARE_S)
         for held in (p.held for p in some if p.moved is moved):
             for turns in (SLOW, FAST):
-                rig.clock.sleep(plan.settle_s)
+                _rest(rig, plan)
                 with played(rig, motion_of(moved, plan) | nudge_of(held, turns, plan)):
                     rig.clock.sleep(plan.period_s)
                     with record.step(NUDGED, moved=moved.name, held=held.name, turns=turns, **stiff):
                         rig.clock.sleep(plan.nudges * plan.period_s + SPARE_S)
+
+
+def _rest(rig: Rig, plan: Plan) -> None:
+    """At their zeros, for a stop leaves axes where they came to rest."""
+    assert rig.motion is not None
+    rig.motion.move({name: waits_at(axis) for name, axis in axes_of(rig.file).items()})
+    rig.clock.sleep(plan.settle_s)
 
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> list[Result]:
@@ -120,8 +126,7 @@ def measured(results: Sequence[Result]) -> Iterator[Measured]:
 def untold(rig: RigFile) -> tuple[Quantity, ...]:
     """Sisters of a measure of which a rig has no pair."""
     some = pairs(rig, "all")
-    told = {name for p in some for name in ("excursion" if p.held.unit == "m" else "excursion_angle", ratio_of(p), *named(p),
-                                            coupling_of(p))}  # fmt: skip
+    told = {name for p in some for name in (excursion_of(p), ratio_of(p), *named(p), coupling_of(p))}
     return tuple(q for q in MEASURES if q.name not in told)
 
 

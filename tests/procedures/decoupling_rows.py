@@ -20,7 +20,8 @@ from sim_backend.motion import DecouplingAsked
 
 RIG: RigFile = load_rig("rlsrm")
 PLAN = Plan()
-SHAPED = ControlParams(speed=(0.08, 6.0), rise=(0.3, 20.0))
+GIVEN = ControlParams()
+"""Sines are given, not sent, as while waves play."""
 TELEMETRY_S = 1e-3
 FORCES = ("force", "torque")
 
@@ -30,7 +31,7 @@ def _axis(rows: np.ndarray, k: int) -> Axis:
     return Axis(*(rows[:, TRACE.index(n)] for n in names))
 
 
-def run(params: PlantParams, pair: Pair, turns: float, plan: Plan = PLAN, control: ControlParams = SHAPED) -> Run:
+def run(params: PlantParams, pair: Pair, turns: float, plan: Plan = PLAN, control: ControlParams = GIVEN) -> Run:
     """One step: loops closed at zero, waves, the first period left out."""
     m, h = AXES.index(pair.moved.name), AXES.index(pair.held.name)
     kind, size, period = [0.0, 0.0], [0.0, 0.0], [1.0, 1.0]
@@ -45,13 +46,13 @@ def run(params: PlantParams, pair: Pair, turns: float, plan: Plan = PLAN, contro
     return Run(pair, turns, t, _axis(rows, m), _axis(rows, h), control.kp[h], ("MOVING",), 0, len(rows))
 
 
-def analysed(params: PlantParams, plan: Plan = PLAN, control: ControlParams = SHAPED) -> list[Result]:
+def analysed(params: PlantParams, plan: Plan = PLAN, control: ControlParams = GIVEN) -> list[Result]:
     """Every pair of a machine."""
     runs = [run(params, p, turns, plan, control) for p in pairs(RIG, plan.moved) for turns in (0.0, SLOW, FAST)]
     return results(runs, RIG, plan, TELEMETRY_S)
 
 
-def truth(params: PlantParams, pair: Pair, plan: Plan = PLAN, control: ControlParams = SHAPED) -> Mapping[str, float]:
+def truth(params: PlantParams, pair: Pair, plan: Plan = PLAN, control: ControlParams = GIVEN) -> Mapping[str, float]:
     size = plan.amplitude_m if pair.moved.unit == "m" else plan.amplitude_rad
     asked = DecouplingAsked({}, pair.moved.name, pair.held.name, size, plan.period_s, plan.periods, plan.sliding, plan.smooth_hz)
     return crossed(params, control, asked)

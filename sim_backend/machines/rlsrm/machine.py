@@ -15,6 +15,7 @@ from sim_backend.machines.rlsrm.operator import Attendant
 from sim_backend.machines.rlsrm.params import DEG, ControlParams, Each, Map, PlantParams
 from sim_backend.machines.rlsrm.plant import LOOP_TICKS, READINGS, TICKS_S
 from sim_backend.machines.rlsrm.states import states
+from sim_backend.machines.rlsrm.truth_decoupling import decoupling
 from sim_backend.motion import Motions
 
 EACH: Final = {"phase_gain": NAMES, "resistance_spread": NAMES, "stator_zero": ("1", "2")}
@@ -175,5 +176,5 @@ RLSRM = Machine(
     name="rlsrm", stated=stated, defects=DEFECTS, params=params, quantities=quantities, targets=TARGETS, make=make,
     radial=slice(0, 0), integral_gains=frozenset(("ki_x", "ki_angle")), turns=False, channels=CHANNELS, places=places,
     spoil=spoil, supply_V=90.0, windings={}, copper_W=copper_W, operator=operator, traced=lambda _: READINGS, daily=DAILY,
-    controls=SETTABLE, levitates=False, tick_s=1 / TICKS_S, period_s=LOOP_TICKS / TICKS_S, motions=Motions(), states=states,
+    controls=SETTABLE, levitates=False, tick_s=1 / TICKS_S, period_s=LOOP_TICKS / TICKS_S, motions=Motions(decoupling=decoupling), states=states,
 )  # fmt: skip

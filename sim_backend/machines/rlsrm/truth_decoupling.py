@@ -14,7 +14,10 @@ from typing import Final
 
 import numpy as np
 
+from bench.rigfile import RigFile
 from sim_backend.core.plant import Array
+from sim_backend.machine import Truth
+from sim_backend.machines.rlsrm.device import control_of
 from sim_backend.machines.rlsrm.params import ControlParams, PlantParams
 from sim_backend.machines.rlsrm.plant import AXES, LOOP_TICKS, TRACE, Plant, distribute, slopes
 from sim_backend.motion import DecouplingAsked
@@ -25,6 +28,13 @@ PLACES: Final = 60  # over a period
 HALF: Final = math.sqrt(2 * math.log(2))  # a Gauss function is a half there, standard deviations
 BEAT_S: Final = 0.02
 AT: Final = {name: k for k, name in enumerate(TRACE)}
+
+
+def decoupling(rig: RigFile, drawn: Truth, asked: DecouplingAsked) -> Mapping[str, float]:
+    """`crossed`, of what was drawn and of the controller with what it has of the asked settings."""
+    del rig
+    had = {name: value * drawn.defects.get(f"factor_{name}", 1.0) for name, value in asked.settings.items()}
+    return crossed(drawn.plant.plant, control_of(had), asked)
 
 
 def crossed(p: PlantParams, c: ControlParams, asked: DecouplingAsked) -> Mapping[str, float]:
@@ -54,7 +64,7 @@ def _periods(p: PlantParams, c: ControlParams, asked: DecouplingAsked, moved: in
     kind, size, period = [0.0, 0.0], [0.0, 0.0], [1.0, 1.0]
     kind[moved], size[moved], period[moved] = 1.0, asked.amplitude, asked.period_s
     waves = {"wave": tuple(kind), "amplitude": tuple(size), "period": tuple(period), "phase": (0.0, 0.0), "offset": (0.0, 0.0)}
-    plant = Plant(p, replace(c, **waves))  # type: ignore[arg-type]
+    plant = Plant(p, replace(c, **waves, speed=(0.0, 0.0)))  # type: ignore[arg-type]  # a sine is given, not sent
     plant.switch(on=True, x=True, angle=True)
     plant.run(asked.period_s, 0)
     for _ in range(asked.periods):
