@@ -270,8 +270,8 @@ class Motions:
         pulls: of where a channel along and one around read, what holds a shaft that magnets pull, by quantity and where.
         cogging: harmonics of it along and around, by quantity and where, of a shaft turned at rad/s at a place, m.
         runout: what turns with the shaft, vectors by quantity, plane and place along, m.
-        decoupling: of an axis that is held, its largest `excursion` and the moved one's `swing`, effective value `cross`, `peak`
-            and `slope` of what crosses over.
+        decoupling: of an axis that is held, its largest `excursion` and the moved one's `swing`, effective value `cross`,
+            `peak` and `slope` of what crosses over.
         speeds: at the torque limit, by sharing: `speed` rad/s, `bound` A of the torque current, `ripple` rad/s.
     """
 

@@ -42,16 +42,18 @@ def of_signals(runs: Sequence[Run], rig: RigFile, plan: Plan, period_s: float) -
     yield from signals.losses(lost, expected, plan.max_lost, lambda share: runs[int(np.argmax(share))].pair.where)
     for r in runs:
         if r.turns == 0:
-            yield from _limits(r, rig)
+            yield from _limits(r, rig, plan)
 
 
-def _limits(r: Run, rig: RigFile) -> Iterator[Finding]:
+def _limits(r: Run, rig: RigFile, plan: Plan) -> Iterator[Finding]:
     for axis, asked in ((r.pair.moved, r.moved.asked), (r.pair.held, r.held.asked)):
-        limit = rig.parameters.get(axis.limit)
-        share = 0.0 if limit is None else float((np.abs(asked) >= LIMIT * limit.default).mean())
-        if limit is not None and share > LIMITED:
-            text = (f"the loop of {axis.name} asks for its limit, {limit.default:g} {axis.force}, in {share:.1%} of the "
-                    "samples: what is read is that of the limit. Move slower or less.")  # fmt: skip
+        if axis.limit not in rig.parameters:
+            continue
+        limit = plan.parameters.get(axis.limit, rig.parameters[axis.limit].default)
+        share = float((np.abs(asked) >= LIMIT * limit).mean())
+        if share > LIMITED:
+            text = (f"the loop of {axis.name} asks for its limit, {limit:g} {axis.force}, in {share:.1%} of the samples: "
+                    "what is read is that of the limit. Move slower or less.")  # fmt: skip
             yield Finding("asks-for-its-limit", text, r.pair.where, Effect.INDETERMINATE, (f"@{r.pair.where}",))
 
 
@@ -72,8 +74,8 @@ def _moved(r: Result, plan: Plan) -> Iterator[Finding]:
     size = size_of(r.pair, plan)
     for what, sine in (("set point", r.sent), ("reading", r.went)):
         if abs(sine.amplitude / size - 1) > plan.max_miss:
-            text = (f"the {what} of {r.pair.moved.name} swings by {sine.amplitude:.4g} {r.pair.moved.unit}; expected {size:.4g}: "
-                    f"{r.pair.held.name} was not tried by the motion of the plan.")  # fmt: skip
+            text = (f"the {what} of {r.pair.moved.name} swings by {sine.amplitude:.4g} {r.pair.moved.unit}; expected "
+                    f"{size:.4g}: {r.pair.held.name} was not tried by the motion of the plan.")  # fmt: skip
             yield Finding("sine-not-followed", text, r.pair.where, Effect.INDETERMINATE, (f"@{r.pair.where}",))
             return
 
@@ -93,12 +95,14 @@ def _stuck(r: Result, plan: Plan) -> Iterator[Finding]:
     held, moved, force = r.pair.held, r.pair.moved, r.pair.held.force
     follow = min(r.slow.follow, r.fast.follow)
     still = " and does not move by a count" if not np.ptp(r.place) else ""
-    text = (f"{held.name} is stuck{still} while {moved.name} moves: friction takes {abs(r.slow.drag):.2g} {force} of a slow nudge, "
-            f"which it follows by {follow:.0%}; the cross force that the loop sees is {r.cross.peak:.2g} {force} at most. A force "
-            "within the friction moves nothing, so that the excursion says nothing of the controller's map. Is a brake left on? "
-            "Does the bearing rub each way alone?")  # fmt: skip
+    text = (f"{held.name} is stuck{still} while {moved.name} moves: friction takes {abs(r.slow.drag):.2g} {force} of a slow "
+            f"nudge, which it follows by {follow:.0%}; the cross force that the loop sees is {r.cross.peak:.2g} {force} at "
+            "most. A force within the friction moves nothing, so that the excursion says nothing of the controller's map. Is a "
+            "brake left on? Does the bearing rub each way alone?")  # fmt: skip
     concerned = (excursion_of(r.pair), ratio_of(r.pair), *named(r.pair), coupling_of(r.pair))
-    yield Finding("stuck", text, r.pair.where, Effect.INDETERMINATE, tuple(f"{name}@{r.pair.where}" for name in concerned))
+    yield Finding(
+        "stuck", text, r.pair.where, Effect.INDETERMINATE, tuple(f"{name}@{r.pair.where}" for name in concerned)
+    )
 
 
 def _known(r: Result) -> Finding:

@@ -22,8 +22,8 @@ BOUND = 1.959964  # U over u: half a count is U, for an axis that is pushed rest
 RECTANGLE = math.sqrt(3)
 DRAG_SHARE = 0.25  # half width: of the drag's part in a result, for it changes along the path
 SWINGS = 6.0  # counts a period: an axis that swings by half a count with the motion, unseen, takes pi at its greatest
-STANDS = 30.0  # likewise where the reading stands: without the chatter that makes it less drag is three times as much, and an axis
-# may go through a count in a tenth of a period. The more often the reading changes, the more of it the loop asks for
+STANDS = 30.0  # likewise where the reading stands: without the chatter that makes it less drag is three times as much, and an
+# axis may go through a count in a tenth of a period. The more often the reading changes, the more of it the loop asks for
 PEAK = 2.5  # of what is not seen, over its effective value
 
 
@@ -96,7 +96,9 @@ def result(run: Run, slow: Nudge, fast: Nudge, rig: RigFile, plan: Plan, period_
     peak = float(np.ptp(run.moved.read[within])) / 2
     estimates = {**_places(run.pair, excursion, peak), **_forces(run.pair, found, slow, fast, plan)}
     rate = np.cos(sent.angle(t))
-    return Result(run.pair, sent, went, excursion, cut["place"], cut["moved"], rate, found, slow, fast, run.stiffness, estimates)
+    return Result(
+        run.pair, sent, went, excursion, cut["place"], cut["moved"], rate, found, slow, fast, run.stiffness, estimates
+    )
 
 
 def _count(pair: Pair) -> float:

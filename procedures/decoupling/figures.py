@@ -39,9 +39,11 @@ def _traces(r: Result, plan: Plan) -> Figure:
         Series("", t[::every], fine * _extremes(high, every, np.maximum), "faint"),
         Series("mean of the periods", t[::every], fine * r.place.mean(axis=0)[::every]),
     )
-    below = Figure("", "", "", "time / s", f"{r.pair.held.name} - set point / {small}", held, lines=(("set point", 0.0),))
-    caption = (f"{r.pair.moved.name} follows its sine, {r.pair.held.name} is held: readings over a period, {len(r.place)} periods "
-               f"laid on each other. The largest excursion is {fine * r.excursion:.3g} {small}.")  # fmt: skip
+    below = Figure(
+        "", "", "", "time / s", f"{r.pair.held.name} - set point / {small}", held, lines=(("set point", 0.0),)
+    )
+    caption = (f"{r.pair.moved.name} follows its sine, {r.pair.held.name} is held: readings over a period, {len(r.place)} "
+               f"periods laid on each other. The largest excursion is {fine * r.excursion:.3g} {small}.")  # fmt: skip
     moved = Series(r.pair.moved.name, t[::every], big * r.moved.mean(axis=0)[::every])
     key = f"traces-{r.pair.held.name}-{r.pair.moved.name}"
     return Figure(key, f"Both axes over a period: {r.pair.where}", caption, "time / s", f"{r.pair.moved.name} / {unit}",
@@ -61,8 +63,9 @@ def _forces(r: Result) -> Figure:
         some = np.flatnonzero(r.cross.on & (way * r.rate > 0))
         order = some[np.argsort(place[some])]
         series.append(Series(name, scale * place[order], force[order]))
-    caption = (f"What {r.pair.moved.name}'s motion puts on {r.pair.held.name}, by the force that its loop asks for against it, over "
-               "the place of the moved axis, in the mean of the periods, where that axis slides; a constant is left out.")  # fmt: skip
+    caption = (f"What {r.pair.moved.name}'s motion puts on {r.pair.held.name}, by the force that its loop asks for against it, "
+               "over the place of the moved axis, in the mean of the periods, where that axis slides; a constant is left "
+               "out.")  # fmt: skip
     key = f"cross-{r.pair.held.name}-{r.pair.moved.name}"
     return Figure(key, f"Cross force: {r.pair.where}", caption, f"{r.pair.moved.name} / {unit}",
                   f"force on {r.pair.held.name} / m{r.pair.held.force}", tuple(series), lines=(("zero", 0.0),))  # fmt: skip

@@ -1,7 +1,7 @@
 """The bare numbers of a held axis: what it moves by, what crosses over to it, what friction takes of it.
 
-Of the held axis, q its place, F what its loop asks for, in newtons of the controller's own map, which are kappa true ones, and c
-what the moved axis puts on it:
+Of the held axis, q its place, F what its loop asks for, in newtons of the controller's own map, which are kappa true ones, and
+c what the moved axis puts on it:
 
     J q'' = kappa F + c - b q' - friction + constant
 
@@ -52,7 +52,8 @@ def sine(t: Array, x: Array, period: float) -> Sine:
 def periods(t: Array, x: Array, period: float, count: int, samples: int) -> Array:
     """Whole periods (count, samples) of readings (n,), from the first one on, by straight lines where samples are missing."""
     grid = t[0] + np.arange(count * samples) * (period / samples)
-    return np.interp(grid, t, x).reshape(count, samples)
+    out: Array = np.interp(grid, t, x).reshape(count, samples)
+    return out
 
 
 def smoothed(x: Array, period: float, hz: float, order: int = 0) -> Array:
@@ -76,8 +77,8 @@ def sliding(moved: Sine, t: Array, share: float) -> Bools:
 class Cross:
     """Cross force of a held axis over periods of the moved one: `wave` (n,) in their mean, without its mean over where `on`;
     its effective value and its peak there, the slope over what the moved axis' loop asks for, and each of them by period
-    (p,); effective value without the drag's part, `plain`, and of that part, `dragged`; effective value of what the moved axis' loop asks for, `other`; how
-    often the held axis' reading `changes` there in a period."""
+    (p,); effective value without the drag's part, `plain`, and of that part, `dragged`; of what the moved axis' loop asks
+    for, `other`; how often the held axis' reading `changes` there in a period."""
 
     wave: Array
     on: Bools
@@ -91,7 +92,9 @@ class Cross:
     changes: float
 
 
-def cross(force: Array, other: Array, place: Array, period: float, on: Bools, hz: float, inertia: float, drag: float) -> Cross:
+def cross(
+    force: Array, other: Array, place: Array, period: float, on: Bools, hz: float, inertia: float, drag: float
+) -> Cross:
     """Of periods (p, n): what the held axis' loop asks for, what the moved one's does, the held axis' reading.
 
     The effective value is less what the scatter of the periods adds to it. A period's share in it is its projection on the
@@ -103,11 +106,18 @@ def cross(force: Array, other: Array, place: Array, period: float, on: Bools, hz
     wave = all_periods.mean(axis=0)
     told = _told(_centred(all_periods, on), by)
     part = _centred(all_periods - without, on).mean(axis=0)
-    values = [_effective(_centred(all_periods, on)), *(float(x.mean()) for x in told[1:])]
     return Cross(
-        wave - float(wave[on].mean()), on, *values, told, _effective(_centred(without, on)), math.sqrt(float((part**2).mean())),
-        math.sqrt(float((by**2).mean())), float((np.diff(place, axis=1)[:, on[1:]] != 0).sum()) / len(place),
-    )  # fmt: skip
+        wave=wave - float(wave[on].mean()),
+        on=on,
+        rms=_effective(_centred(all_periods, on)),
+        peak=float(told[1].mean()),
+        slope=float(told[2].mean()),
+        by_period=told,
+        plain=_effective(_centred(without, on)),
+        dragged=math.sqrt(float((part**2).mean())),
+        other=math.sqrt(float((by**2).mean())),
+        changes=float((np.diff(place, axis=1)[:, on[1:]] != 0).sum()) / len(place),
+    )
 
 
 def _effective(every: Array) -> float:

@@ -31,18 +31,28 @@ from procedures.stages.pairs import lacks, pairs, played, silenced, sine, waits_
 PLACE = Quantity("excursion", "m", "largest distance of the held axis from its set point, by its encoder")
 ANGLE = Quantity("excursion_angle", "rad", "largest angle of the held axis from its set point, by its encoder",
                  title="excursion")  # fmt: skip
-RATIO = Quantity("peak_ratio", "1", "largest excursion of the held axis over the moved one's swing", title="ratio of peaks")
+RATIO = Quantity(
+    "peak_ratio", "1", "largest excursion of the held axis over the moved one's swing", title="ratio of peaks"
+)
 PER_ANGLE = Quantity("peak_per_angle", "m/rad", "largest excursion of the held axis over the moved one's swing",
                      title="ratio of peaks")  # fmt: skip
 PER_STROKE = Quantity("peak_per_stroke", "rad/m", "largest excursion of the held axis over the moved one's swing",
                       title="ratio of peaks")  # fmt: skip
-CROSS_FORCE = Quantity("cross_force", "N", "effective value of the force that the moved axis' motion puts on the held one")
-CROSS_TORQUE = Quantity("cross_torque", "N m", "effective value of the torque that the moved axis' motion puts on the held one")
+CROSS_FORCE = Quantity(
+    "cross_force", "N", "effective value of the force that the moved axis' motion puts on the held one"
+)
+CROSS_TORQUE = Quantity(
+    "cross_torque", "N m", "effective value of the torque that the moved axis' motion puts on the held one"
+)
 PEAK_FORCE = Quantity("peak_cross_force", "N", "greatest force that the moved axis' motion puts on the held one")
 PEAK_TORQUE = Quantity("peak_cross_torque", "N m", "greatest torque that the moved axis' motion puts on the held one")
 SHARE = Quantity("cross_share", "1", "slope of the cross force over what the moved axis' loop asks for")
-PER_TORQUE = Quantity("force_per_torque", "1/m", "slope of the cross force over the torque that the moved axis' loop asks for")
-PER_FORCE = Quantity("torque_per_force", "m", "slope of the cross torque over the force that the moved axis' loop asks for")
+PER_TORQUE = Quantity(
+    "force_per_torque", "1/m", "slope of the cross force over the torque that the moved axis' loop asks for"
+)
+PER_FORCE = Quantity(
+    "torque_per_force", "m", "slope of the cross torque over the force that the moved axis' loop asks for"
+)
 MEASURES = (PLACE, ANGLE, RATIO, PER_ANGLE, PER_STROKE, CROSS_FORCE, CROSS_TORQUE, PEAK_FORCE, PEAK_TORQUE, SHARE, PER_TORQUE,
             PER_FORCE)  # fmt: skip
 INTEGRATORS = "integrators"
@@ -143,7 +153,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
     known = rig.capabilities.settings.get(INTEGRATORS, {})
     if plan.integrators not in known and (known or plan.integrators not in ("", "on")):
-        yield f"integrators: found {plan.integrators!r}; expected one of {', '.join(known) or 'on (the rig file has no choice)'}"
+        expected = ", ".join(known) or "on (the rig file has no choice)"
+        yield f"integrators: found {plan.integrators!r}; expected one of {expected}"
     if unknown := [name for name in plan.parameters if name not in rig.parameters]:
         yield f"parameters: found {', '.join(unknown)}; expected parameters of this rig"
         return
@@ -153,8 +164,11 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     for moved in {p.moved.name: p.moved for p in some}.values():
         size = plan.amplitude_m if moved.unit == "m" else plan.amplitude_rad
         if not moved.low <= waits_at(moved) - size <= waits_at(moved) + size <= moved.high:
-            yield f"{moved.name}: found a sine of {size:g} {moved.unit}; expected less than the travel, {moved.low:g} to {moved.high:g}"
-        yield from (f"{moved.name}: {problem}" for problem in envelope.problems_of(motion_of(moved, plan) | plan.parameters))
+            travel = f"{moved.low:g} to {moved.high:g}"
+            yield f"{moved.name}: found a sine of {size:g} {moved.unit}; expected less than the travel, {travel}"
+        yield from (
+            f"{moved.name}: {problem}" for problem in envelope.problems_of(motion_of(moved, plan) | plan.parameters)
+        )
     for p in some:
         for turns in (SLOW, FAST):
             yield from (f"{p.where}: {problem}" for problem in envelope.problems_of(nudge_of(p.held, turns, plan)))

@@ -30,7 +30,8 @@ class Axis:
 @dataclass(frozen=True)
 class Run:
     """A pair over one step; `turns`: periods of the held axis' own sine to one of the motion, 0 where it is left alone.
-    `t` (n,) s, at which both were read, `stiffness` of the held axis' loop, `modes` of the controller, samples lost and expected."""
+    `t` (n,) s, at which both were read, `stiffness` of the held axis' loop, `modes` of the controller, samples lost and
+    expected."""
 
     pair: Pair
     turns: float
@@ -45,13 +46,14 @@ class Run:
 
 def read_runs(recording: Recording[Plan]) -> list[Run]:
     """Every step of every pair that it tells of, in time order."""
-    out = []
-    for kind in (ALONE, NUDGED):
-        for step in recording.steps(kind):
-            for pair in pairs(recording.rig, "all"):
-                if pair.moved.name == step.labels["moved"] and step.labels.get("held", pair.held.name) == pair.held.name:
-                    out.append(_run(recording, step, pair))
-    return out
+    steps = [step for kind in (ALONE, NUDGED) for step in recording.steps(kind)]
+    some = pairs(recording.rig, "all")
+    return [_run(recording, step, pair) for step in steps for pair in some if _is_of(step, pair)]
+
+
+def _is_of(step: Step, pair: Pair) -> bool:
+    """While an axis is moved alone every other one is held."""
+    return bool(step.labels["moved"] == pair.moved.name and step.labels.get("held", pair.held.name) == pair.held.name)
 
 
 def _run(recording: Recording[Plan], step: Step, pair: Pair) -> Run:
@@ -59,9 +61,7 @@ def _run(recording: Recording[Plan], step: Step, pair: Pair) -> Run:
     data = step.read(*dict.fromkeys((*(c for a in both for c in (a.channel, a.reference, a.asked)), STATE)))
     codes, rig = recording.rig.choices(STATE), recording.rig
     told = tuple(codes.get(int(code), str(int(code))) for code in np.unique(data[STATE]))
-    moved, held = (
-        Axis(*(np.asarray(data[c], np.float64) for c in (a.channel, a.reference, a.asked))) for a in both
-    )
+    moved, held = (Axis(*(np.asarray(data[c], np.float64) for c in (a.channel, a.reference, a.asked))) for a in both)
     return Run(
         pair=pair,
         turns=float(step.labels.get("turns", 0.0)),

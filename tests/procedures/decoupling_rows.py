@@ -54,7 +54,9 @@ def analysed(params: PlantParams, plan: Plan = PLAN, control: ControlParams = GI
 
 def truth(params: PlantParams, pair: Pair, plan: Plan = PLAN, control: ControlParams = GIVEN) -> Mapping[str, float]:
     size = plan.amplitude_m if pair.moved.unit == "m" else plan.amplitude_rad
-    asked = DecouplingAsked({}, pair.moved.name, pair.held.name, size, plan.period_s, plan.periods, plan.sliding, plan.smooth_hz)
+    asked = DecouplingAsked(
+        {}, pair.moved.name, pair.held.name, size, plan.period_s, plan.periods, plan.sliding, plan.smooth_hz
+    )
     return crossed(params, control, asked)
 
 

@@ -176,5 +176,6 @@ RLSRM = Machine(
     name="rlsrm", stated=stated, defects=DEFECTS, params=params, quantities=quantities, targets=TARGETS, make=make,
     radial=slice(0, 0), integral_gains=frozenset(("ki_x", "ki_angle")), turns=False, channels=CHANNELS, places=places,
     spoil=spoil, supply_V=90.0, windings={}, copper_W=copper_W, operator=operator, traced=lambda _: READINGS, daily=DAILY,
-    controls=SETTABLE, levitates=False, tick_s=1 / TICKS_S, period_s=LOOP_TICKS / TICKS_S, motions=Motions(decoupling=decoupling), states=states,
+    controls=SETTABLE, levitates=False, tick_s=1 / TICKS_S, period_s=LOOP_TICKS / TICKS_S, states=states,
+    motions=Motions(decoupling=decoupling),
 )  # fmt: skip

@@ -1,5 +1,5 @@
-"""What truly crosses over from an axis that moves to one that is held, on a drawn machine: the same machine and controller, moved
-by the same sine, looked at beside its encoders, every 50 us.
+"""What truly crosses over from an axis that moves to one that is held, on a drawn machine: the same machine and controller,
+moved by the same sine, looked at beside its encoders, every 50 us.
 
 The cross force is what the held axis gets beyond kappa times what was asked for it, kappa being the true force of one that is
 asked for, in the mean over the places of the motion: of a difference of two demands, both ways, at rest, by the true map.
@@ -63,7 +63,13 @@ def _periods(p: PlantParams, c: ControlParams, asked: DecouplingAsked, moved: in
     """Rows of every tick of each period, the first one left out."""
     kind, size, period = [0.0, 0.0], [0.0, 0.0], [1.0, 1.0]
     kind[moved], size[moved], period[moved] = 1.0, asked.amplitude, asked.period_s
-    waves = {"wave": tuple(kind), "amplitude": tuple(size), "period": tuple(period), "phase": (0.0, 0.0), "offset": (0.0, 0.0)}
+    waves = {
+        "wave": tuple(kind),
+        "amplitude": tuple(size),
+        "period": tuple(period),
+        "phase": (0.0, 0.0),
+        "offset": (0.0, 0.0),
+    }
     plant = Plant(p, replace(c, **waves, speed=(0.0, 0.0)))  # type: ignore[arg-type]  # a sine is given, not sent
     plant.switch(on=True, x=True, angle=True)
     plant.run(asked.period_s, 0)
