@@ -130,7 +130,7 @@ def test_the_page_of_captures_is_up_to_date_and_its_bytes_are_right() -> None:
     ]  # fmt: skip
 
 
-@pytest.mark.parametrize("rig", ["amb5dof", "amb1dof", "tsbs6", "lira"])
+@pytest.mark.parametrize("rig", ["amb5dof", "amb1dof", "tsbs6", "lira", "rlsrm"])
 def test_the_page_of_a_rig_is_up_to_date(rig: str) -> None:
     page = PAGE.with_name(f"{rig}.md").read_text(encoding="utf-8")
     assert protocoldoc.replaced(page, protocoldoc.own_sections(load_rig(rig))) == page, (

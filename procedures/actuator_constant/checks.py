@@ -12,10 +12,10 @@ from bench.rigfile import RigFile
 from procedures.actuator_constant.estimates import Looked, Result
 from procedures.actuator_constant.plan import Plan
 from procedures.actuator_constant.steps import Added, Common, Taken
+from procedures.position_loops import recorded
 from procedures.position_loops.motors import around, motors
 from procedures.shared import signals
 
-HELD = "LEVITATED"
 OFF = 0.05  # share by which the captured sine may differ from what was asked for
 SUM_OFF = 0.03  # by which a motor's current may differ from what its coils carry
 NOISE = 5.0  # standard uncertainties beside that
@@ -29,16 +29,14 @@ def of_signals(taken: Sequence[Taken], added: Sequence[Added], rig: RigFile, pla
         yield Finding("no-sines", "no sine was injected; expected those of the plan (was the run stopped early?)", "",
                       Effect.ERROR)  # fmt: skip
         return
-    if missing := [t for t in taken if not t.position.size]:
-        yield Finding("sine-not-captured", f"{len(missing)} of {len(taken)} sines were not captured.", missing[0].where,
-                      Effect.ERROR)  # fmt: skip
+    missing = [t for t in taken if not t.position.size]
+    if (told := recorded.not_captured("sine-not-captured", "sines", missing, len(taken))) is not None:
+        yield told
         return
     steps = [(t.where, t.common) for t in taken] + [(f"{a.common.loop}, {a.size:+g} A added", a.common) for a in added]
-    for where, common in steps:
-        if other := [s for s in common.states if rig.binding.mode(s) != HELD]:
-            text = f"the controller was in {', '.join(other)}: its loops did not hold the shaft."
-            yield Finding("not-levitated", text, where, Effect.ERROR)
-            return
+    if (told := recorded.not_held(((where, common.states) for where, common in steps), rig)) is not None:
+        yield told
+        return
     lost, expected = np.array([(c.lost, c.expected) for _, c in steps], dtype=float).T
     yield from signals.losses(lost, expected, plan.max_lost, lambda share: steps[int(np.argmax(share))][0])
     for t in taken:

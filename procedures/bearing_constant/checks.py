@@ -15,10 +15,9 @@ from bench.rigfile.toleranced import Toleranced
 from procedures.bearing_constant.estimates import K_B, Result
 from procedures.bearing_constant.plan import Plan
 from procedures.bearing_constant.steps import Visit
-from procedures.shared import signals
+from procedures.position_loops import recorded
 from procedures.shared.leastsquares import linear
 
-HELD = "LEVITATED"
 SURE = 4.5  # standard uncertainties that a sound rig does not reach
 TILTED = 0.02  # of the heaviest weight, that may scatter between the planes: a millimetre of where it hangs
 LEAST = 1e-3  # share by which weights may disagree whatever the scatter
@@ -31,17 +30,14 @@ def of_signals(visits: Sequence[Visit], plan: Plan, rig: RigFile) -> Iterator[Fi
     if not visits:
         yield Finding("no-visits", "no visit was recorded (was the run stopped early?)", "", Effect.ERROR)
         return
-    if missing := [v for v in visits if v.currents is None]:
-        text = f"{len(missing)} of {len(visits)} visits were not captured."
-        yield Finding("visit-not-captured", text, missing[0].where, Effect.ERROR)
+    missing = [v for v in visits if v.currents is None]
+    if (told := recorded.not_captured("visit-not-captured", "visits", missing, len(visits))) is not None:
+        yield told
         return
-    for v in visits:
-        if other := [s for s in v.states if rig.binding.mode(s) != HELD]:
-            text = f"the controller was in {', '.join(other)}: its loops did not hold the mover."
-            yield Finding("visit-not-held", text, v.where, Effect.ERROR)
-            return
-    lost, expected = np.array([(v.lost, v.expected) for v in visits], dtype=float).T
-    yield from signals.losses(lost, expected, plan.max_lost, lambda share: visits[int(np.argmax(share))].where)
+    if (told := recorded.not_held(((v.where, v.states) for v in visits), rig, "visit-not-held", "mover")) is not None:
+        yield told
+        return
+    yield from recorded.losses(visits, plan.max_lost)
     worst = max(visits, key=lambda v: v.limited)
     if worst.limited > 0:
         text = f"a loop was at its limit in {worst.limited:.1%} of the time: then it holds nothing. Hang less."

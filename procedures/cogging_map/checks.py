@@ -14,10 +14,9 @@ from bench.uncertainty import Estimate
 from procedures.cogging_map.estimates import Result, slope
 from procedures.cogging_map.plan import Plan
 from procedures.cogging_map.steps import Pass
+from procedures.position_loops import recorded
 from procedures.position_loops.motors import around
-from procedures.shared import signals
 
-HELD = "LEVITATED"
 GAP = 0.25  # of a period of the highest harmonic, between neighbouring places
 PROGRESS = 0.05  # by which the speed may differ from the plan's
 APART = 5.0  # standard uncertainties
@@ -34,11 +33,9 @@ def of_signals(passes: Sequence[Pass], rig: RigFile, plan: Plan) -> Iterator[Fin
             "no-sweeps", "nothing was swept; expected the plan's loops (was the run stopped early?)", "", Effect.ERROR
         )
         return
-    for p in passes:
-        if other := [s for s in p.states if rig.binding.mode(s) != HELD]:
-            text = f"the controller was in {', '.join(other)}: its loops did not hold the shaft."
-            yield Finding("not-levitated", text, p.where, Effect.ERROR)
-            return
+    if (told := recorded.not_held(((p.where, p.states) for p in passes), rig)) is not None:
+        yield told
+        return
     for p in passes:
         if (told := _covered(p, plan)) is not None:
             yield told
@@ -50,8 +47,7 @@ def of_signals(passes: Sequence[Pass], rig: RigFile, plan: Plan) -> Iterator[Fin
         text = "found less than two sweeps each way of a kind (was the run stopped early?)"
         yield Finding("no-sweeps", text, passes[-1].map.loop, Effect.ERROR)
         return
-    lost, expected = np.array([(p.lost, p.expected) for p in passes], dtype=float).T
-    yield from signals.losses(lost, expected, plan.max_lost, lambda share: passes[int(np.argmax(share))].where)
+    yield from recorded.losses(passes, plan.max_lost)
     for loop in dict.fromkeys(p.map.loop for p in passes if p.limited):
         hit = [p for p in passes if p.map.loop == loop and p.limited]
         text = f"the loop was at its limit in {len(hit)} sweeps, {max(p.limited for p in hit):.1%} of the worst. Sweep slower."

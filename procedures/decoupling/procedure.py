@@ -185,7 +185,8 @@ def requires(rig: RigFile) -> Requires:
     if not axes:
         return Requires(roles=("motion",), capabilities=("positioning",))
     return Requires(
-        roles=("motion",), channels=(*(a.channel for a in axes), STATE), capabilities=("positioning",),
+        roles=("motion",), capabilities=("positioning",),
+        channels=(*(c for a in axes for c in (a.channel, a.reference, a.asked) if c), STATE),
         uses=("settings.integrators",), lacks=tuple(lacks(rig)),
     )  # fmt: skip
 

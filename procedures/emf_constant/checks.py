@@ -15,9 +15,8 @@ from procedures.emf_constant.moves import chosen
 from procedures.emf_constant.nameplate import compared
 from procedures.emf_constant.plan import Plan
 from procedures.emf_constant.steps import Taken
-from procedures.shared import signals
+from procedures.position_loops import recorded
 
-HELD = "LEVITATED"
 APART = 4.5  # standard uncertainties that what should be alike may lie apart
 GAINS = (
     3.0  # standard uncertainties of a voltage's gain: beyond what a certificate allows one coil against the mean of all
@@ -31,17 +30,14 @@ def of_signals(taken: Sequence[Taken], rig: RigFile, plan: Plan) -> Iterator[Fin
         yield Finding("no-moves", "the mover was not sent anywhere; expected the plan's moves (was the run stopped early?)", "",
                       Effect.ERROR)  # fmt: skip
         return
-    if missing := [t for t in taken if t.move is None]:
-        yield Finding("move-not-captured", f"{len(missing)} of {len(taken)} moves were not captured.", missing[0].where,
-                      Effect.ERROR)  # fmt: skip
+    missing = [t for t in taken if t.move is None]
+    if (told := recorded.not_captured("move-not-captured", "moves", missing, len(taken))) is not None:
+        yield told
         return
-    for t in taken:
-        if other := [s for s in t.states if rig.binding.mode(s) != HELD]:
-            text = f"the controller was in {', '.join(other)}: its loops did not hold the shaft."
-            yield Finding("not-levitated", text, t.where, Effect.ERROR)
-            return
-    lost, expected = np.array([(t.lost, t.expected) for t in taken], dtype=float).T
-    yield from signals.losses(lost, expected, plan.max_lost, lambda share: taken[int(np.argmax(share))].where)
+    if (told := recorded.not_held(((t.where, t.states) for t in taken), rig)) is not None:
+        yield told
+        return
+    yield from recorded.losses(taken, plan.max_lost)
 
 
 def of_results(

@@ -14,10 +14,9 @@ from procedures.encoder_zero.estimates import Result, differences, shifts
 from procedures.encoder_zero.groups import PLACES, Group, groups, settle_s, zeros
 from procedures.encoder_zero.plan import Plan
 from procedures.encoder_zero.steps import Answers, Taken, answers, column
+from procedures.position_loops import recorded
 from procedures.position_loops.motors import phase_rate
-from procedures.shared import signals
 
-HELD = "LEVITATED"
 DEG = 180 / math.pi
 APART = 4.5  # standard uncertainties by which a sound machine's places may be apart
 TAKEN = 0.1  # share of a trial that a zero may go otherwise than it should
@@ -30,17 +29,14 @@ def of_signals(taken: Sequence[Taken], rig: RigFile, plan: Plan) -> Iterator[Fin
         yield Finding("no-currents", "no current was stepped; expected those of the plan (was the run stopped early?)", "",
                       Effect.ERROR)  # fmt: skip
         return
-    if missing := [t for t in taken if t.means is None]:
-        yield Finding("current-not-captured", f"{len(missing)} of {len(taken)} currents were not captured.", missing[0].where,
-                      Effect.ERROR)  # fmt: skip
+    missing = [t for t in taken if t.means is None]
+    if (told := recorded.not_captured("current-not-captured", "currents", missing, len(taken))) is not None:
+        yield told
         return
-    for t in taken:
-        if other := [s for s in t.states if rig.binding.mode(s) != HELD]:
-            text = f"the controller was in {', '.join(other)}: its loops did not hold the mover."
-            yield Finding("mover-not-held", text, t.where, Effect.ERROR)
-            return
-    lost, expected = np.array([(t.lost, t.expected) for t in taken], dtype=float).T
-    yield from signals.losses(lost, expected, plan.max_lost, lambda share: taken[int(np.argmax(share))].where)
+    if (told := recorded.not_held(((t.where, t.states) for t in taken), rig, "mover-not-held", "mover")) is not None:
+        yield told
+        return
+    yield from recorded.losses(taken, plan.max_lost)
     for group in groups(rig, plan):
         some = [t for t in taken if t.loop == group.loop]
         yield from _limited(some, group)

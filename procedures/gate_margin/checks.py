@@ -13,10 +13,10 @@ from procedures.gate_margin.fit import Array, cut
 from procedures.gate_margin.place import grid, motion, radial, samples
 from procedures.gate_margin.plan import Plan
 from procedures.gate_margin.steps import Taken, Trial
+from procedures.position_loops.recorded import LEVITATED
 from procedures.shared import signals
 
 UM = 1e6
-HELD = "LEVITATED"
 LIMITED = 2e-3  # share of telemetry's samples
 MORE = 3.0  # times as much scatter of windows as everywhere else
 TAILS = 0.15  # of the mean largest reading: more than rounding and a slow motion make of normal noise
@@ -32,7 +32,7 @@ def of_trials(trials: Sequence[Trial], gate_m: float, rig: RigFile, plan: Plan) 
         )
         yield Finding("gate-not-tried", f"which readings the gate watches was not tried: {why}.", "")
         return
-    passed = [t for t in trials if HELD in [rig.binding.mode(s) for s in t.states]]
+    passed = [t for t in trials if LEVITATED in [rig.binding.mode(s) for s in t.states]]
     for t in passed:
         if t.pulsed:
             text = (f"the controller counted as levitated while {t.probe} went {t.farthest * UM:.1f} µm off every "
@@ -76,7 +76,7 @@ def of_signals(taken: Sequence[Taken], gate: tuple[float, float], rig: RigFile, 
         yield Finding("windows-not-captured", text, worst.place.name, Effect.ERROR)
         return
     for t in taken:
-        if other := [s for s in t.states if rig.binding.mode(s) != HELD]:
+        if other := [s for s in t.states if rig.binding.mode(s) != LEVITATED]:
             text = f"the controller was in {', '.join(other)}: it did not hold the shaft."
             yield Finding("not-levitated", text, t.place.name, Effect.ERROR)
             return

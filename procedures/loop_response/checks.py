@@ -14,10 +14,9 @@ from procedures.loop_response.fit import Point
 from procedures.loop_response.injection import SENSOR
 from procedures.loop_response.plan import Plan
 from procedures.loop_response.steps import REFINED, Taken
+from procedures.position_loops import recorded
 from procedures.sensitivity.checks import SCOPE, ZONES
-from procedures.shared import signals
 
-HELD = "LEVITATED"
 OFF = 0.05  # share by which the captured sine may differ from what was asked for
 UNEXPLAINED = 1e-4  # chance that a sound run's lines lie so far off their curve, all its curves together
 LIMITED = 0.0  # share of a line's samples that may be at the limit: a loop at its limit is not linear
@@ -29,13 +28,12 @@ def of_signals(taken: Sequence[Taken], rig: RigFile, plan: Plan) -> Iterator[Fin
         yield Finding("no-sines", "no sine was injected; expected those of the plan (was the run stopped early?)", "",
                       Effect.ERROR)  # fmt: skip
         return
-    if missing := [t for t in taken if t.line is None]:
-        yield Finding("sine-not-captured", f"{len(missing)} of {len(taken)} sines were not captured.", missing[0].where,
-                      Effect.ERROR)  # fmt: skip
+    missing = [t for t in taken if t.line is None]
+    if (told := recorded.not_captured("sine-not-captured", "sines", missing, len(taken))) is not None:
+        yield told
         return
     yield from _held(taken, rig)
-    lost, expected = np.array([(t.lost, t.expected) for t in taken], dtype=float).T
-    yield from signals.losses(lost, expected, plan.max_lost, lambda share: taken[int(np.argmax(share))].where)
+    yield from recorded.losses(taken, plan.max_lost)
     for t in taken:
         if t.line is not None and abs(t.line.wave - 1) > OFF:
             text = (f"the captured sine has {t.line.wave:.3g} of the amplitude asked for: another frequency, or none. Look at "
@@ -48,11 +46,9 @@ def of_signals(taken: Sequence[Taken], rig: RigFile, plan: Plan) -> Iterator[Fin
 
 
 def _held(taken: Sequence[Taken], rig: RigFile) -> Iterator[Finding]:
-    for t in taken:
-        if other := [s for s in t.states if rig.binding.mode(s) != HELD]:
-            text = f"the controller was in {', '.join(other)}: its loops did not hold the shaft."
-            yield Finding("not-levitated", text, t.where, Effect.ERROR)
-            return
+    if (told := recorded.not_held(((t.where, t.states) for t in taken), rig)) is not None:
+        yield told
+        return
 
 
 def _limited(some: Sequence[Taken], axis: str) -> Iterator[Finding]:

@@ -12,13 +12,12 @@ from bench.rigfile import RigFile
 from bench.rigfile.places import PlaceError, Places
 from bench.rigfile.toleranced import Toleranced
 from bench.uncertainty import interval
+from procedures.position_loops import recorded
 from procedures.pull_ratio.estimates import CONSTANT, LEVER, RATIO, TURN, Result
 from procedures.pull_ratio.plan import Plan
 from procedures.pull_ratio.planes import planes
 from procedures.pull_ratio.steps import Taken
-from procedures.shared import signals
 
-HELD = "LEVITATED"
 APART = 3.0  # standard uncertainties: two rectangular gains end at 2.4 of theirs together
 SURE = 5.0  # standard uncertainties of noise beside what is allowed
 AGAINST = math.pi / 2
@@ -32,17 +31,14 @@ def of_signals(taken: Sequence[Taken], rig: RigFile, plan: Plan) -> Iterator[Fin
         yield Finding("no-levels", "found no level; expected those of the plan (was the run stopped early?)", "",
                       Effect.ERROR)  # fmt: skip
         return
-    if missing := [t for t in taken if t.readings is None]:
-        text = f"{len(missing)} of {len(taken)} levels were not captured."
-        yield Finding("level-not-captured", text, missing[0].where, Effect.ERROR)
+    missing = [t for t in taken if t.readings is None]
+    if (told := recorded.not_captured("level-not-captured", "levels", missing, len(taken))) is not None:
+        yield told
         return
-    for t in taken:
-        if other := [s for s in t.states if rig.binding.mode(s) != HELD]:
-            text = f"the controller was in {', '.join(other)}: its loops did not hold the shaft."
-            yield Finding("not-levitated", text, t.where, Effect.ERROR)
-            return
-    lost, expected = np.array([(t.lost, t.expected) for t in taken], dtype=float).T
-    yield from signals.losses(lost, expected, plan.max_lost, lambda share: taken[int(np.argmax(share))].where)
+    if (told := recorded.not_held(((t.where, t.states) for t in taken), rig)) is not None:
+        yield told
+        return
+    yield from recorded.losses(taken, plan.max_lost)
     if hit := [t for t in taken if t.limited > 0]:
         worst = max(hit, key=lambda t: t.limited)
         text = (f"a loop was at its limit in {len(hit)} of {len(taken)} levels ({worst.limited:.1%} of the time in the worst). "

@@ -9,12 +9,11 @@ import numpy as np
 
 from bench.findings import Effect, Finding
 from bench.rigfile import RigFile
+from procedures.position_loops import recorded
 from procedures.runout_map.estimates import Results, mean
 from procedures.runout_map.plan import Plan
 from procedures.runout_map.steps import Turned
-from procedures.shared import signals
 
-HELD = "LEVITATED"
 GAP = 0.02  # of a turn, between neighbouring angles
 PROGRESS = 0.05  # by which the speed may differ from the plan's
 AWAY_M = 0.2e-3  # that a place may read off
@@ -29,17 +28,14 @@ def of_signals(turned: Sequence[Turned], rig: RigFile, plan: Plan) -> Iterator[F
         text = "found less than two turns each way of a place (was the run stopped early?)"
         yield Finding("no-turns", text, "", Effect.ERROR)
         return
-    for t in turned:
-        if other := [s for s in t.states if rig.binding.mode(s) != HELD]:
-            text = f"the controller was in {', '.join(other)}: its loops did not hold the shaft."
-            yield Finding("not-levitated", text, t.where, Effect.ERROR)
-            return
+    if (told := recorded.not_held(((t.where, t.states) for t in turned), rig)) is not None:
+        yield told
+        return
     for t in turned:
         if (told := _covered(t, plan)) is not None:
             yield told
             return
-    lost, expected = np.array([(t.lost, t.expected) for t in turned], dtype=float).T
-    yield from signals.losses(lost, expected, plan.max_lost, lambda share: turned[int(np.argmax(share))].where)
+    yield from recorded.losses(turned, plan.max_lost)
 
 
 def _covered(t: Turned, plan: Plan) -> Finding | None:

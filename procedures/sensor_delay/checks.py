@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-import numpy as np
-
 from bench.findings import Effect, Finding
 from bench.rigfile import RigFile
+from procedures.position_loops import recorded
 from procedures.position_loops.injection import ability
 from procedures.sensor_delay.estimates import Result
 from procedures.sensor_delay.plan import Plan
 from procedures.sensor_delay.sines import crossover_hz
 from procedures.sensor_delay.steps import Taken
-from procedures.shared import signals
 
-HELD = "LEVITATED"
 OFF = 0.05  # share by which the captured sine may differ from what was asked for
 UNEXPLAINED = 1e-4  # chance that a sound run's phases lie so far off a delay's line, all probes together
 BEFORE = 4.5  # standard uncertainties by which a reading may be early
@@ -27,17 +24,14 @@ def of_signals(taken: Sequence[Taken], rig: RigFile, plan: Plan) -> Iterator[Fin
         yield Finding("no-sines", "no sine was injected; expected those of the plan (was the run stopped early?)", "",
                       Effect.ERROR)  # fmt: skip
         return
-    if missing := [t for t in taken if not t.positions.size]:
-        yield Finding("sine-not-captured", f"{len(missing)} of {len(taken)} sines were not captured.", missing[0].where,
-                      Effect.ERROR)  # fmt: skip
+    missing = [t for t in taken if not t.positions.size]
+    if (told := recorded.not_captured("sine-not-captured", "sines", missing, len(taken))) is not None:
+        yield told
         return
-    for t in taken:
-        if other := [s for s in t.states if rig.binding.mode(s) != HELD]:
-            text = f"the controller was in {', '.join(other)}: its loops did not hold the shaft."
-            yield Finding("not-levitated", text, t.where, Effect.ERROR)
-            return
-    lost, expected = np.array([(t.lost, t.expected) for t in taken], dtype=float).T
-    yield from signals.losses(lost, expected, plan.max_lost, lambda share: taken[int(np.argmax(share))].where)
+    if (told := recorded.not_held(((t.where, t.states) for t in taken), rig)) is not None:
+        yield told
+        return
+    yield from recorded.losses(taken, plan.max_lost)
     if ability(rig).wave and (wrong := [t for t in taken if abs(t.wave - 1) > OFF]):
         text = (f"the captured sine has {wrong[0].wave:.3g} of the amplitude asked for: another frequency, or none. Look at "
                 "the rig file's capabilities.loop_injection.")  # fmt: skip

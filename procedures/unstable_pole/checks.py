@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-import numpy as np
-
 from bench.findings import Effect, Finding
 from bench.rigfile import RigFile
-from procedures.shared import signals
+from procedures.position_loops import recorded
+from procedures.position_loops.recorded import LEVITATED
 from procedures.unstable_pole.estimates import Result
 from procedures.unstable_pole.plan import Plan
 from procedures.unstable_pole.steps import Taken
 
-HELD = "LEVITATED"
 EXCITED = 0.1  # of the travel along: a tilt of which a finding tells
 SURE = 2.0  # standard uncertainties
 STILL = 0.1  # of the push: how far held currents may move
@@ -31,14 +29,13 @@ def of_signals(taken: Sequence[Taken], rig: RigFile, plan: Plan) -> Iterator[Fin
                 "capabilities.hold, and whether the controller was levitated.")  # fmt: skip
         yield Finding("hold-not-seen", text, unseen[0].where, Effect.ERROR)
         return
-    fell = [t for t in taken if {rig.binding.mode(s) for s in t.states} != {HELD} or t.caught > plan.bound_m]
+    fell = [t for t in taken if {rig.binding.mode(s) for s in t.states} != {LEVITATED} or t.caught > plan.bound_m]
     if fell:
         worst = max(fell, key=lambda t: t.caught)
         text = (f"after {len(fell)} of {len(taken)} shots the shaft was not back: it read {worst.caught * 1e6:.0f} µm at the "
                 "end of the capture. Push less, or hold for less time.")  # fmt: skip
         yield Finding("not-caught", text, worst.where, Effect.ERROR)
-    lost, expected = np.array([(t.lost, t.expected) for t in taken], dtype=float).T
-    yield from signals.losses(lost, expected, plan.max_lost, lambda share: taken[int(np.argmax(share))].where)
+    yield from recorded.losses(taken, plan.max_lost)
     moved = [t for t in taken if t.moved > STILL * plan.push_A]
     if moved:
         text = (f"in {len(moved)} of {len(taken)} shots the currents did not stay where they were held, by "

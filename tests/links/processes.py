@@ -163,9 +163,11 @@ def real_bench(folder: Path, *arguments: str) -> Iterator[Child]:
 
 
 @contextmanager
-def bench(folder: Path, *arguments: str, stdin: int = subprocess.DEVNULL) -> Iterator[Child]:
+def bench(
+    folder: Path, *arguments: str, stdin: int = subprocess.DEVNULL, catalogue: str = "tiny_catalogue"
+) -> Iterator[Child]:
     """`bench` with the tests' small procedures in its catalogue, for the block."""
-    child = _start(folder, "-m", "tiny_catalogue", *arguments, stdin=stdin)
+    child = _start(folder, "-m", catalogue, *arguments, stdin=stdin)
     try:
         yield child
     finally:

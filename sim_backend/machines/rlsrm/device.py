@@ -12,7 +12,8 @@ import numpy as np
 
 from sim_backend.core.plant import Array, DriveLaw
 from sim_backend.machines.rlsrm.params import PHASES, ControlParams, Each, Pair, PlantParams
-from sim_backend.machines.rlsrm.plant import AXES, FAULTS, LOOP_TICKS, READINGS, ROW, STATES, TICKS_S, Plant
+from sim_backend.machines.rlsrm.plant import AXES, FAULTS, LOOP_TICKS, STATES, TICKS_S
+from sim_backend.machines.rlsrm.served import READINGS, ROW, Served
 
 SHIFT: Final = LOOP_TICKS - 1
 CHANNELS: Final = ROW[: ROW.index("state")]
@@ -80,7 +81,7 @@ class StagePlant:
 
     def __init__(self, built: Built, seed: int = 0) -> None:
         self.built, self.mode = built, 0
-        self.core = Plant(built.plant, built.control)
+        self.core = Served(built.plant, built.control)
         self.core.put(*built.rest)
         self._chosen = int(built.control.test_phase)
         self._means, self._instants = (np.random.default_rng([seed & (2**64 - 1), k]) for k in (1, 2))

@@ -13,7 +13,8 @@ from sim_backend.machines.rlsrm.defects import DEFECTS, NAMES
 from sim_backend.machines.rlsrm.device import CHANNELS, SETTABLE, Built, Sensed, StagePlant
 from sim_backend.machines.rlsrm.operator import Attendant
 from sim_backend.machines.rlsrm.params import DEG, ControlParams, Each, Map, PlantParams
-from sim_backend.machines.rlsrm.plant import LOOP_TICKS, READINGS, TICKS_S
+from sim_backend.machines.rlsrm.plant import LOOP_TICKS, TICKS_S
+from sim_backend.machines.rlsrm.served import READINGS
 from sim_backend.machines.rlsrm.states import states
 from sim_backend.machines.rlsrm.truth_decoupling import decoupling
 from sim_backend.motion import Motions
@@ -63,7 +64,7 @@ def params(v: Numbers, d: Numbers) -> Built:
         thermal_resistance=v["thermal_resistance"], thermal_capacity=v["thermal_capacity"],
     )  # fmt: skip
     sensed = Sensed(
-        current_gain=_each(v, "i_{}.gain"), current_offset=_each(v, "i_{}.offset"),
+        current_gain=_gains(v, d), current_offset=_each(v, "i_{}.offset"),
         voltage_gain=_each(v, "u_{}.gain"), voltage_offset=_each(v, "u_{}.offset"), current_noise=v["current_noise"],
         voltage_noise=v["voltage_noise"], told=_each(d, "told_factor_{}"), cold=d["cold_told"],
     )  # fmt: skip
@@ -106,15 +107,20 @@ def _moved(v: Numbers, d: Numbers) -> dict[str, Any]:
 
 def _driven(v: Numbers, d: Numbers) -> dict[str, Any]:
     """Windings and amplifiers."""
-    gains, factors = _each(v, "i_{}.gain"), _each(d, "current_factor_{}")
     return {
         "resistance": tuple(v["machine.resistance"] * (1 + share) for share in _each(v, "resistance_spread_{}")),
         "supply": v["supply_V"],
         "share": _each(d, "voltage_share_{}"),
-        "current_gain": tuple(gain * factor for gain, factor in zip(gains, factors, strict=True)),
+        "current_gain": _gains(v, d),
         "current_offset": _each(v, "i_{}.offset"),
         "wired": _wired(d),
     }
+
+
+def _gains(v: Numbers, d: Numbers) -> Each:
+    """Of the amplifiers' own sensors, which their loops and the host read."""
+    both = zip(_each(v, "i_{}.gain"), _each(d, "current_factor_{}"), strict=True)
+    return tuple(gain * factor for gain, factor in both)
 
 
 def _wired(d: Numbers) -> Each:
