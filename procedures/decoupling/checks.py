@@ -15,6 +15,7 @@ from procedures.shared import signals
 from procedures.stages.pairs import Pair, pairs
 
 PLAYING = ("MOVING", "HOLDING")
+DRAGGED = 0.3  # of the cross force; where friction lies along the axis that slides it is up to 0.2
 FOLLOWS = 0.5  # of a nudge, below which the held axis is stuck
 LIMIT = 0.999  # of a loop's greatest force: it is there
 LIMITED = 2e-3  # share of samples
@@ -82,11 +83,12 @@ def _moved(r: Result, plan: Plan) -> Iterator[Finding]:
 
 def stuck(r: Result, plan: Plan) -> bool:
     """Whether friction hides what crosses over: the held axis does not go with a nudge, or friction takes more than half of
-    the cross force's peak, and that is worth a share of a count."""
+    the cross force's peak, or is a good part of what is seen of it, and is worth a share of a count."""
     assert r.pair.held.pitch is not None
     if min(r.slow.follow, r.fast.follow) < FOLLOWS:
         return True
-    return r.slow.drag > r.cross.peak / 2 and r.hidden > plan.max_hidden * r.pair.held.pitch.value
+    much = r.slow.drag > r.cross.peak / 2 or r.cross.dragged > DRAGGED * r.cross.rms
+    return much and r.hidden > plan.max_hidden * r.pair.held.pitch.value
 
 
 def _stuck(r: Result, plan: Plan) -> Iterator[Finding]:

@@ -23,7 +23,8 @@ def crossed(done: Simulated) -> Found:
         size = plan.amplitude_m if pair.moved.unit == "m" else plan.amplitude_rad
         asked = DecouplingAsked(settings_of(done, plan.parameters), pair.moved.name, pair.held.name, size, plan.period_s,
                                 plan.periods, plan.sliding, plan.smooth_hz)  # fmt: skip
-        true = of(rig, done.drawn, asked)
+        if not (true := of(rig, done.drawn, asked)):
+            continue
         rms, peak = named(pair)
         yield excursion_of(pair), pair.where, true["excursion"]
         yield ratio_of(pair), pair.where, true["excursion"] / true["swing"]

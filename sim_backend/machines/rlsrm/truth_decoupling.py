@@ -49,6 +49,8 @@ def crossed(p: PlantParams, c: ControlParams, asked: DecouplingAsked) -> Mapping
         sent[k] = ticks[:, AT[f"ref_{asked.moved}"]]
         force[k] = rows[: n * LOOP_TICKS, AT[FORCES[held]]].reshape(n, -1).mean(axis=1)
         wanted[k], others[k] = (ticks[:, AT[f"asked_{FORCES[axis]}"]] for axis in (held, moved))
+    if not np.ptp(swung):  # a machine that cannot move
+        return {}
     kappa = scale(p, c, asked)
     on = _sliding(sent[0], asked.sliding)
     cross, other = (_centred(x, asked, on) for x in (force - kappa * wanted, others))
