@@ -21,10 +21,18 @@ Array = npt.NDArray[np.float64]
 BOUND = 1.959964  # U over u: half a count is U, for an axis that is pushed rests at the edges of counts
 RECTANGLE = math.sqrt(3)
 DRAG_SHARE = 0.25  # half width: of the drag's part in a result, for it changes along the path
-SWINGS = 6.0  # counts a period: an axis that swings by half a count with the motion, unseen, takes pi at its greatest
-STANDS = 30.0  # likewise where the reading stands: without the chatter that makes it less drag is three times as much, and an
-# axis may go through a count in a tenth of a period. The more often the reading changes, the more of it the loop asks for
-PEAK = 2.5  # of what is not seen, over its effective value
+SWINGS = 6.0  # counts a period, at least: an axis that swings by half a count with the motion, unseen, takes pi at its greatest
+STANDS = 30.0  # counts a period of an axis whose reading stands: without the chatter that makes it less, drag is three times as
+# much, and it may go through a count in a tenth of a period. The more often the reading changes, the less
+PEAK = 2.0  # of what is not seen, over its effective value
+
+
+@dataclass(frozen=True)
+class Swing:
+    """Of a held axis: its largest excursion in counts, and what it moves, kg or kg m^2."""
+
+    counts: float
+    inertia: float
 
 
 @dataclass(frozen=True)
@@ -86,15 +94,17 @@ def result(run: Run, slow: Nudge, fast: Nudge, rig: RigFile, plan: Plan, period_
     sent, went = (fit.sine(run.t, x, plan.period_s) for x in (run.moved.reference, run.moved.read))
     t = run.t[0] + np.arange(n) * (plan.period_s / n)
     on = fit.sliding(sent, t, plan.sliding)
-    drag = fit.dragging(slow, fast)
+    drag, inertia = fit.dragging(slow, fast), inertia_of(rig, run.pair.held, plan.inertia)
     found = fit.cross(
-        cut["force"], cut["other"], cut["place"], plan.period_s, on, plan.smooth_hz,
-        inertia_of(rig, run.pair.held, plan.inertia), drag,
+        cut["force"], cut["other"], cut["place"], plan.period_s, on, plan.smooth_hz, inertia, drag,
     )  # fmt: skip
     within = run.t <= run.t[0] + plan.periods * plan.period_s
     excursion = float(np.abs(run.held.read - run.held.reference)[within].max())
     peak = float(np.ptp(run.moved.read[within])) / 2
-    estimates = {**_places(run.pair, excursion, peak), **_forces(run.pair, found, slow, fast, plan)}
+    estimates = {
+        **_places(run.pair, excursion, peak),
+        **_forces(run.pair, found, slow, fast, Swing(excursion / _count(run.pair), inertia), plan),
+    }
     rate = np.cos(sent.angle(t))
     return Result(
         run.pair, sent, went, excursion, cut["place"], cut["moved"], rate, found, slow, fast, run.stiffness, estimates
@@ -141,10 +151,10 @@ def named(pair: Pair) -> tuple[str, str]:
     return ("cross_force", "peak_cross_force") if pair.held.force == "N" else ("cross_torque", "peak_cross_torque")
 
 
-def _forces(pair: Pair, found: Cross, slow: Nudge, fast: Nudge, plan: Plan) -> dict[str, Estimate]:
+def _forces(pair: Pair, found: Cross, slow: Nudge, fast: Nudge, swing: Swing, plan: Plan) -> dict[str, Estimate]:
     """Cross force, its peak, and per force of the moved axis' loop."""
     force, (rms, peak) = pair.held.force, named(pair)
-    unseen = _unseen(pair, found, slow, fast, plan)
+    unseen = _unseen(pair, found, (slow, fast), swing, plan)
     per = 1 / found.other if found.other > 0 else 0.0
     drags = [DRAG_SHARE * x for x in (abs(found.rms - found.plain), 2 * found.dragged, found.dragged * per / 2)]
     wanted = ((rms, found.rms, force, unseen), (peak, found.peak, force, unseen * PEAK),
@@ -161,11 +171,14 @@ def _forces(pair: Pair, found: Cross, slow: Nudge, fast: Nudge, plan: Plan) -> d
     return out
 
 
-def _unseen(pair: Pair, found: Cross, slow: Nudge, fast: Nudge, plan: Plan) -> float:
-    """What friction takes of a motion within a count."""
-    drag = max(abs(n.drag) / n.speed for n in (slow, fast))
-    share = drag * _count(pair) / plan.period_s
-    return max(STANDS - found.changes, SWINGS) * share
+def _unseen(pair: Pair, found: Cross, nudges: tuple[Nudge, Nudge], swing: Swing, plan: Plan) -> float:
+    """What drag and mass take of a motion that the reading does not show: half a count at the cross force's own pace w,
+    |J w^2 + j b w|, of one count; of more counts it is less, for their edges lie where they may."""
+    drag = max(abs(n.drag) / n.speed for n in nudges)
+    pace = min(found.pace, 2 * math.pi * plan.smooth_hz)
+    moving = math.hypot(drag * pace, swing.inertia * pace**2) * _count(pair) / 2 / max(swing.counts, 1.0)
+    standing = max(STANDS - found.changes, SWINGS) * drag * _count(pair) / plan.period_s
+    return max(moving, standing)
 
 
 def _flat(known: str, name: str, half: float, unit: str) -> Influence:

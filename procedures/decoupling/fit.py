@@ -78,7 +78,8 @@ class Cross:
     """Cross force of a held axis over periods of the moved one: `wave` (n,) in their mean, without its mean over where `on`;
     its effective value and its peak there, the slope over what the moved axis' loop asks for, and each of them by period
     (p,); effective value without the drag's part, `plain`, and of that part, `dragged`; of what the moved axis' loop asks
-    for, `other`; how often the held axis' reading `changes` there in a period."""
+    for, `other`; how often the held axis' reading `changes` there in a period; how fast the cross force changes over its size,
+    `pace` rad/s."""
 
     wave: Array
     on: Bools
@@ -90,6 +91,7 @@ class Cross:
     dragged: float
     other: float
     changes: float
+    pace: float
 
 
 def cross(
@@ -104,6 +106,7 @@ def cross(
     all_periods = without + drag * smoothed(place, period, hz, 1)
     by = _centred(smoothed(other, period, hz), on).mean(axis=0)
     wave = all_periods.mean(axis=0)
+    rate = np.gradient(wave, period / wave.size)[on]
     told = _told(_centred(all_periods, on), by)
     part = _centred(all_periods - without, on).mean(axis=0)
     return Cross(
@@ -117,6 +120,7 @@ def cross(
         dragged=math.sqrt(float((part**2).mean())),
         other=math.sqrt(float((by**2).mean())),
         changes=float((np.diff(place, axis=1)[:, on[1:]] != 0).sum()) / len(place),
+        pace=float(rate.std() / max(wave[on].std(), 1e-300)),
     )
 
 

@@ -28,7 +28,7 @@ class Plan(BenchPlan):
     settle_s: float = Field(1.0, ge=0.1)  # at rest, before each
     sliding: float = Field(0.5, gt=0, lt=1)  # share of the greatest speed, above which the moved axis counts as sliding
     smooth_hz: float = Field(5.0, gt=0)  # at which a Gauss filter of the cross force lets half through
-    force_scale: float = Field(0.022, ge=0)  # standard uncertainty, share, of a newton of the controller's map
+    force_scale: float = Field(0.025, ge=0)  # standard uncertainty, share, of a newton of the controller's map
     torque_scale: float = Field(0.04, ge=0)  # likewise of a newton metre
     inertia: dict[str, float] = Field(
         default_factory=dict

@@ -157,6 +157,7 @@ def test_excursion_and_force_grow_with_the_error_of_the_map() -> None:
         (replace(TYPICAL, brake=(0.1, 0.0)), X, True),
         (replace(TYPICAL, brake=(0.1, 0.0)), ANGLE, False),
         (replace(TYPICAL, brake=(0.0, 5e-3)), ANGLE, True),
+        (replace(TYPICAL, brake=(0.01, 0.0)), X, True),
         (replace(TYPICAL, brake=(1e-3, 0.0)), X, False),
         (TYPICAL, X, False),
     ],
