@@ -27,7 +27,8 @@ OF = {
     "amb1dof": ("derivative", "estimator-compare"),
     "lira": ("loop-response", "unstable-pole", "pull-ratio", "mission", "gate-margin", "actuator-constant", "cogging-map",
              "runout-map", "bearing-constant", "current-step", "encoder-zero", "sensor-delay", "emf-constant", "coil-map"),
-    "rlsrm": ("decoupling",),
+    "rlsrm": ("map-zero", "inductance-map", "load-response", "positioning", "step-following", "sine-following", "axis-friction",
+              "axis-inertia", "decoupling"),
 }  # fmt: skip
 PAIRS = [(rig, name) for rig, names in OF.items() for name in names]
 TABLES = ("channels", "sensors", "parameters", "geometry", "machine")
@@ -86,7 +87,7 @@ def without_capability(rig: RigFile, key: str) -> RigFile:
         holder[last] = ""
         if table == "model":
             del holder[last]
-    elif last in ("path", "injection", "motion", "loop_injection", "hold", "coil_map", "positioning"):
+    elif last in ("path", "injection", "motion", "loop_injection", "hold", "coil_map", "positioning", "phase_test"):
         holder[last] = None
     elif key == "set_points" or holder is content or isinstance(holder[last], dict):
         holder[last] = {}

@@ -32,7 +32,7 @@ def of_signals(runs: Sequence[Run], rig: RigFile, plan: Plan, period_s: float) -
     for r in runs:
         if other := [m for m in r.modes if m not in PLAYING]:
             text = f"the controller was in {', '.join(other)}: its loops did not hold the axes."
-            yield Finding("axes-let-go", text, r.pair.where, Effect.ERROR)
+            yield Finding("axis-not-held", text, r.pair.where, Effect.ERROR)
             return
         whole = (plan.nudges if r.turns else plan.periods) * samples(plan, period_s)
         if len(r.t) < (1 - plan.max_lost) * whole:

@@ -15,10 +15,10 @@ from procedures.decoupling import fit
 from procedures.decoupling.fit import Cross, Nudge, Sine
 from procedures.decoupling.plan import Plan
 from procedures.decoupling.steps import FAST, SLOW, Run
+from procedures.stages.counts import half_count, rounded
 from procedures.stages.pairs import Pair, inertia_of
 
 Array = npt.NDArray[np.float64]
-BOUND = 1.959964  # U over u: half a count is U, for an axis that is pushed rests at the edges of counts
 RECTANGLE = math.sqrt(3)
 DRAG_SHARE = 0.25  # half width: of the drag's part in a result, for it changes along the path
 SWINGS = 6.0  # counts a period, at least: an axis that swings by half a count with the motion, unseen, takes pi at its greatest
@@ -118,9 +118,7 @@ def _count(pair: Pair) -> float:
 
 def _places(pair: Pair, excursion: float, peak: float) -> dict[str, Estimate]:
     """Largest excursion and its ratio to the sine's peak."""
-    half = Influence(f"rounding/{pair.where}", "rounding of the reading, half a count", _count(pair) / 2 / BOUND,
-                     pair.held.unit, "B", "normal")  # fmt: skip
-    largest = Estimate.of(excursion, half)
+    largest = excursion + rounded(pair.where, pair.held, half_count(pair.held))
     out = {excursion_of(pair): largest}
     if peak > 0:
         out[ratio_of(pair)] = largest * (1 / peak)

@@ -16,7 +16,7 @@ from procedures.stages.pairs import Pair, pairs
 from sim_backend.machines.rlsrm.params import ControlParams, PlantParams
 from sim_backend.machines.rlsrm.plant import AXES, TRACE, Plant
 from sim_backend.machines.rlsrm.truth_decoupling import crossed
-from sim_backend.motion import DecouplingAsked
+from sim_backend.stage_motion import DecouplingAsked
 
 RIG: RigFile = load_rig("rlsrm")
 PLAN = Plan()

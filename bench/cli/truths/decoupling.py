@@ -14,7 +14,7 @@ def crossed(done: Simulated) -> Found:
     """Of each pair of axes, the same machine moved anew: its true motion, whatever the encoders make of it."""
     from procedures.decoupling.estimates import coupling_of, excursion_of, named, ratio_of
     from procedures.stages.pairs import pairs
-    from sim_backend.motion import DecouplingAsked
+    from sim_backend.stage_motion import DecouplingAsked
 
     rig, plan, of = done.recording.rig, done.recording.plan, done.drawn.machine.motions.decoupling
     if of is None:

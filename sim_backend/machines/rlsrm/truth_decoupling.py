@@ -20,7 +20,7 @@ from sim_backend.machine import Truth
 from sim_backend.machines.rlsrm.device import control_of
 from sim_backend.machines.rlsrm.params import ControlParams, PlantParams
 from sim_backend.machines.rlsrm.plant import AXES, LOOP_TICKS, TRACE, Plant, distribute, slopes
-from sim_backend.motion import DecouplingAsked
+from sim_backend.stage_motion import DecouplingAsked
 
 FORCES: Final = ("force", "torque")
 TRIED: Final = (0.1, 0.01)  # N, N m: demands on the held axis that kappa is the slope between

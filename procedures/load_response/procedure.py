@@ -1,0 +1,192 @@
+"""Answers of a positioned stage to known loads: compliance and friction without integrators, deviation and return with them.
+
+Measurands, by axis: displacement per newton in the mean of approaches from both sides; the band in which friction holds the
+axis, and the friction that does; how many newtons one is by the controller's map; the greatest deviation after a load is put
+on or taken off, and what is left of it some seconds later, by the axis' own encoder.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+
+from bench.errors import AnalysisError
+from bench.figures import Shown
+from bench.findings import Effect, Finding, Findings
+from bench.procedure import Measured, Procedure, Quantity, read_method
+from bench.procedure.requires import Requires
+from bench.procedure.rig import Rig
+from bench.procedure.roles import RigState
+from bench.recording import Recording
+from bench.recording.recorder import Recorder
+from bench.rigfile import RigFile
+from bench.rigfile.envelope import Envelope
+from procedures.load_response import checks, estimates
+from procedures.load_response import figures as drawn
+from procedures.load_response.estimates import BAND, COMPLIANCE, FRICTION, LEFT, PEAK, SCALE, Result
+from procedures.load_response.moves import approaches, disturbances, integrators
+from procedures.load_response.plan import Plan
+from procedures.load_response.sequence import INTEGRATORS, chosen, lead, masses
+from procedures.load_response.sequence import step_count as counted
+from procedures.load_response.steps import STATE, Change, read_changes, read_rests
+from procedures.shared import assumptions
+from procedures.stages.known_loads import loaded, sources
+
+PER = "displacement per newton without integrators, mean of approaches from both sides, over loads both ways"
+HOLDS = "half of what approaches from both sides end apart, and half a count: friction over stiffness"
+HELD = "force with which the bearings stop a slow approach, mean of both ways, without that of pulleys"
+FAR = "greatest deviation from the set point after a load is put on or taken off, the way it drives"
+REST = "deviation that is left some seconds after a load is put on or taken off, the way it drives"
+STATIC = (
+    Quantity(COMPLIANCE, "m/N", PER, title="static compliance"),
+    Quantity("compliance_angle", "rad/(N m)", PER, title="static compliance around"),
+    Quantity(BAND, "m", HOLDS, title="friction band"),
+    Quantity("friction_band_angle", "rad", HOLDS, title="friction band around"),
+    Quantity(FRICTION, "N", HELD),
+    Quantity("friction_torque", "N m", HELD, title="friction around"),
+    Quantity(SCALE, "1", "true force per force that the controller gives by its own map", title="scale of the force"),
+)
+AFTER = (
+    Quantity(PEAK, "m", FAR, title="peak deviation"),
+    Quantity("peak_angle", "rad", FAR, title="peak deviation around"),
+    Quantity(LEFT, "m", REST, title="error after"),
+    Quantity("error_after_angle", "rad", REST, title="error after, around"),
+)
+NO_LOADS = (
+    "hooks, levers: found none that load an axis both ways; expected hooks along the shaft to both ends, or levers on both "
+    "sides"
+)
+MEASURES = (*STATIC, *AFTER)
+
+
+def settings(rig: RigFile, plan: Plan) -> Mapping[str, float]:
+    """Without integrators at first: what one has gathered stays in its loop."""
+    return rig.capabilities.settings.get(INTEGRATORS, {}).get("off" if plan.static else "on", {})
+
+
+def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
+    """Each axis under each load from both sides; then, with integrators, loads put on and taken off."""
+    axes = chosen(rig.file, plan)
+    if plan.static:
+        for axis in axes:
+            approaches(rig, plan, record, axis)
+    if plan.disturbed:
+        integrators(rig, "on")
+        for axis in axes:
+            disturbances(rig, plan, record, axis)
+
+
+@dataclass(frozen=True)
+class Evaluated:
+    """The result, and what it was drawn from."""
+
+    result: Result
+    changes: tuple[Change, ...]
+    plan: Plan
+
+
+def evaluate(recording: Recording[Plan], findings: Findings) -> Evaluated:
+    """Everything."""
+    rig, plan = recording.rig, recording.plan
+    try:
+        rests, found = read_rests(recording), read_changes(recording)
+        findings.gate(checks.of_signals(rests, found, rig, plan))
+        result = estimates.results(rests, found, rig, plan)
+    except AnalysisError as error:
+        findings.end(Finding("loads-missing", f"{error}.", "", Effect.ERROR))
+    findings.gate(checks.of_result(result, rests, plan), so_far=Evaluated(result, tuple(found), plan))
+    return Evaluated(result, tuple(found), plan)
+
+
+def measured(found: Evaluated) -> Iterator[Measured]:
+    """The quantities, kind by kind."""
+    for quantity in MEASURES:
+        for (name, where), estimate in found.result.estimates.items():
+            if name == quantity.name:
+                yield quantity.measured(estimate, where)
+
+
+def check(rig: RigFile, plan: Plan) -> Iterable[str]:
+    """What cannot work before anything starts."""
+    known = [a.name for a in loaded(rig)]
+    if unknown := [name for name in plan.axes if name not in known]:
+        yield f"axes: found {', '.join(unknown)}; known loads pull both ways at {', '.join(known) or 'none'}"
+        return
+    envelope = Envelope(rig)
+    for axis in chosen(rig, plan):
+        labels, key = masses(axis, plan), "lever_masses" if axis.unit == "rad" else "masses"
+        if unknown := [m for m in labels if m not in rig.masses]:
+            yield f"{key}: found {', '.join(unknown)}; the rig file certifies {', '.join(rig.masses)}"
+            continue
+        kg = [rig.masses[m].value for m in labels]
+        if kg != sorted(set(kg)):
+            yield f"{key}: found {kg} kg; expected different masses in ascending order"
+        ends = (-lead(axis, plan), lead(axis, plan))
+        yield from (f"{axis.name}: {problem}" for at in ends for problem in envelope.problems_of({axis.target: at}))
+
+
+def figures(found: Evaluated, recording: Recording[Plan]) -> Iterable[Shown]:
+    """Deviation over load, deviation over time."""
+    del recording
+    return drawn.all_figures(found.result, found.changes, found.plan)
+
+
+def requires(rig: RigFile) -> Requires:
+    """By the names that the rig has."""
+    axes, wanted = loaded(rig), ("positioning", f"settings.{INTEGRATORS}")
+    if rig.capabilities.positioning is None:
+        return Requires(roles=("motion", "operator"), capabilities=wanted)
+    lacks = [] if axes else [NO_LOADS]
+    for axis in axes:
+        bound = {"rate": axis.rate, "stiffness": axis.stiffness, "reference": axis.reference, "asked": axis.asked}
+        if missing := [key for key, name in bound.items() if not name]:
+            lacks.append(f"capabilities.positioning.axes.{axis.name}: found no {', '.join(missing)}")
+    named = [c for a in axes for c in (a.channel, a.reference, a.asked, a.given) if c]
+    return Requires(
+        roles=("motion", "operator"),
+        channels=(*dict.fromkeys(named), STATE),
+        parameters=tuple(p for a in axes for p in (a.target, a.rate, a.stiffness, a.limit) if p),
+        capabilities=wanted,
+        masses=True,
+        lacks=tuple(lacks),
+    )
+
+
+def untold(rig: RigFile) -> tuple[Quantity, ...]:
+    """Of axes that the rig does not have."""
+    units = {a.unit for a in loaded(rig)}
+    along = {"m/N", "m", "N"}
+    return tuple(q for q in MEASURES if q.unit != "1" and ("m" if q.unit in along else "rad") not in units)
+
+
+def left_out(plan: Plan) -> tuple[Quantity, ...]:
+    """What the plan does not do."""
+    return (*(() if plan.static else STATIC), *(() if plan.disturbed else AFTER))
+
+
+def places(rig: RigFile) -> tuple[str, ...]:
+    """Names of hooks and levers, which stand in `where`."""
+    return tuple(s.name for a in loaded(rig) for s in sources(rig, a))
+
+
+procedure = Procedure(
+    name="load-response",
+    title="Loads on a positioned stage: static compliance, friction, deviation and return",
+    measures=MEASURES,
+    state=RigState.HELD,
+    plan=Plan,
+    acquire=acquire,
+    evaluate=evaluate,
+    measured=measured,
+    figures=figures,
+    requires=requires,
+    check=check,
+    settings=settings,
+    step_count=lambda plan: 2 * plan.phases * 2 * (6 * plan.static + 2 * plan.disturbed),
+    steps_on=counted,
+    untold=untold,
+    left_out=left_out,
+    assumes=assumptions.LOAD_RESPONSE,
+    places=("off",),
+    method=read_method(__file__),
+)
