@@ -78,6 +78,15 @@ def test_rounding_is_taken_off_and_what_is_left_is_told() -> None:
         assert np.quantile(np.abs(each), 0.95) > 0.5, name
 
 
+def test_rounding_alone_is_no_rms() -> None:
+    """An axis that is where it is sent reads 0.29 counts off in the rms: that is rounding."""
+    reference = 100 * np.sin(2 * np.pi * T / PERIOD)
+    assert np.sqrt(((np.round(reference) - reference) ** 2).mean()) == pytest.approx(0.289, abs=0.01)
+    found = followed(T, np.round(reference), reference, PERIOD, 1.0)
+    assert found.rms < 0.1
+    assert found.u_rms == pytest.approx(0.289, abs=0.001)
+
+
 def test_one_reading_leaves_half_a_count_open() -> None:
     """u of a rectangle; of a place that goes through many counts hardly anything, and what it adds is taken off."""
     stuck = largest(np.sin(T), np.zeros(5000), 0.5)
