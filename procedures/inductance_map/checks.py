@@ -156,14 +156,16 @@ def _saturation(r: Result, rig: RigFile) -> Iterator[Finding]:
 
 
 def _leakage(r: Result, rig: RigFile, plan: Plan) -> Iterator[Finding]:
-    """What flux goes past the mover is the same in coils that are alike: a phase that has more has another gain of a
-    reading."""
-    at = Terms(len(r.rows.x)).each("leakage")
-    each, scatter = r.found.terms[at], np.sqrt(np.diag(r.found.scatter))[at]
-    share = each / each.mean() - 1
+    """What flux goes past the mover is alike in coils that are alike. L_l g_u/g_i times g_i i_s has the gain of the voltage
+    alone: a phase that has more of it has another gain."""
+    at = Terms(len(r.rows.x))
+    slices = at.each("leakage"), at.each("saturation")
+    product = r.found.terms[slices[0]] * r.found.terms[slices[1]]
+    scatter = np.hypot(*(np.sqrt(np.diag(r.found.scatter))[s] / r.found.terms[s] for s in slices))
+    share = product / product.mean() - 1
     for k, p in enumerate(r.phases):
-        known = [rig.sensors[c].gain.standard_uncertainty for c in (p.current, p.voltage)]
-        if abs(share[k]) > plan.leakage_share + math.hypot(GAINS * math.hypot(*known), APART * scatter[k] / each[k]):
+        known = rig.sensors[p.voltage].gain.standard_uncertainty
+        if abs(share[k]) > plan.leakage_share + math.hypot(GAINS * known, APART * scatter[k]):
             text = (f"its leakage is {share[k]:+.2%} from the others': another gain of its voltage, or its coil's ends "
                     "are not theirs.")  # fmt: skip
             yield Finding("leakage-apart", text, p.name, Effect.INDETERMINATE, (f"gain@{p.name}", "leakage", "slope"))
