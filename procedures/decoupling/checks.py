@@ -27,7 +27,7 @@ def of_signals(runs: Sequence[Run], rig: RigFile, plan: Plan, period_s: float) -
     wanted = [(p.where, turns) for p in pairs(rig, plan.moved) for turns in (0.0, SLOW, FAST)]
     if missing := [f"{where} ({turns:g})" for where, turns in wanted if (where, turns) not in found]:
         text = f"found no step of {', '.join(missing)} (was the run stopped early?)"
-        yield Finding("sines-missing", text, "", Effect.ERROR)
+        yield Finding("pairs-missing", text, "", Effect.ERROR)
         return
     for r in runs:
         if other := [m for m in r.modes if m not in PLAYING]:
@@ -37,7 +37,7 @@ def of_signals(runs: Sequence[Run], rig: RigFile, plan: Plan, period_s: float) -
         whole = (plan.nudges if r.turns else plan.periods) * samples(plan, period_s)
         if len(r.t) < (1 - plan.max_lost) * whole:
             text = f"found {len(r.t)} samples; expected {whole}: whole periods, or a rest of one looks like coupling."
-            yield Finding("sines-missing", text, r.pair.where, Effect.ERROR)
+            yield Finding("pairs-missing", text, r.pair.where, Effect.ERROR)
             return
     lost, expected = np.array([(r.lost, r.expected) for r in runs], dtype=float).T
     yield from signals.losses(lost, expected, plan.max_lost, lambda share: runs[int(np.argmax(share))].pair.where)
@@ -77,7 +77,7 @@ def _moved(r: Result, plan: Plan) -> Iterator[Finding]:
         if abs(sine.amplitude / size - 1) > plan.max_miss:
             text = (f"the {what} of {r.pair.moved.name} swings by {sine.amplitude:.4g} {r.pair.moved.unit}; expected "
                     f"{size:.4g}: {r.pair.held.name} was not tried by the motion of the plan.")  # fmt: skip
-            yield Finding("sine-not-followed", text, r.pair.where, Effect.INDETERMINATE, (f"@{r.pair.where}",))
+            yield Finding("motion-not-made", text, r.pair.where, Effect.INDETERMINATE, (f"@{r.pair.where}",))
             return
 
 

@@ -213,7 +213,7 @@ def test_on_the_rig_a_stuck_axis_is_told(tmp_path: Path, planted: dict[str, floa
 @pytest.mark.parametrize(
     ("planted", "plan", "code"),
     [
-        ({"factor_angle_amplitude": 0.5}, {}, "sine-not-followed"),
+        ({"factor_angle_amplitude": 0.5}, {}, "motion-not-made"),
         ({}, {"parameters": {"limit_angle": 0.02}}, "asks-for-its-limit"),
     ],
 )
