@@ -21,7 +21,9 @@ def test_the_page_has_the_table_of_today() -> None:
 
 
 def test_every_procedure_has_a_line_and_a_rig_that_runs_it() -> None:
-    rows = [line.strip("| ").split(" | ") for line in capabilities_page.table(ON).splitlines() if line.startswith("| [")]
+    rows = [
+        line.strip("| ").split(" | ") for line in capabilities_page.table(ON).splitlines() if line.startswith("| [")
+    ]
     assert len(rows) == len(catalogue.PROCEDURES)
     assert all("needed" in row for row in rows)
 

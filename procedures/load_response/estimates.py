@@ -35,7 +35,8 @@ MOVED = 0.2  # of the lead: an approach that went less far did not leave frictio
 class Static:
     """Of one axis: the loads in their order, `force` (J,) N or N m by the certificates, which of them are `used`, the pairs of
     approaches, the line of deviations and of forces given over the used loads; `moved` (J,), how far the shortest approach
-    under each load went, of the lead; `rubbed`, by source N per N of load by which friction grows beyond what is stated, and its u."""
+    under each load went, of the lead; `rubbed`, by source N per N of load by which friction grows beyond what is stated, and
+    its standard uncertainty; `by_mass`, compliances by each mass alone."""
 
     axis: StageAxis
     loads: tuple[Put, ...]
