@@ -65,9 +65,9 @@ class Positioning(Part):
 
 class PhaseTest(Part):
     """Phases of a motor that carry a current one at a time, in READY: parameter `phase` chooses one by the value that `phases`
-    have, `off` none; `current` A that it is given; `pulse` s: to set it applies the whole supply to that phase for so long, or
-    until the current limit, then the opposite until no current is left. `voltages` and `currents`: by phase the channels of
-    captures."""
+    have, `off` none; `current` A that it is given; `pulse` s: to set it, with `current` 0, applies the whole supply to that
+    phase up to the current limit, holds that until so long is over, and applies the opposite until no current is left.
+    `voltages` and `currents`: by phase the channels of captures."""
 
     phase: str
     phases: Mapping[Name, float] = Field(min_length=1)

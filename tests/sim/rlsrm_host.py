@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.link.codec import Decoder, encode
+from bench.link.fault_injection import parse
 from bench.link.frames import FD, FrameBatch, empty_batch, frame
 from bench.rigfile import load_rig
 from bench.rigfile.capture import Layout
@@ -21,19 +22,20 @@ MESSAGES = RIG.messages
 SESSION = 0x11
 BEAT_S = 0.02
 TICKS = 400  # of a beat
+BEGIN_NS = 1_000_000_000  # nobody hears what comes at zero
 Columns = Mapping[str, npt.NDArray[np.float64]]
 SETTLED = {"rest_x": 0.0, "rest_angle": 0.0}
 
 
 class Host:
-    """The owner of a drawn machine, or of the nominal one (`seed` 0)."""
+    """The owner of a drawn machine, or of the nominal one (`seed` 0); `faults` of its controller as a command line has them."""
 
-    def __init__(self, seed: int = 0, **overrides: float) -> None:
+    def __init__(self, seed: int = 0, faults: tuple[str, ...] = (), **overrides: float) -> None:
         over = {**(nominal(RIG) if seed == 0 else {}), **overrides}
-        self.device = SimulatedController(RIG, draw(RIG, seed, over))
+        self.device = SimulatedController(RIG, draw(RIG, seed, over), [parse(text) for text in faults])
         self.core = self.device.plant.core  # type: ignore[attr-defined]
         self.operator = Attendant(RIG, self.device.plant, self.device.truth)  # type: ignore[arg-type]
-        self._tokens, self._beats, self.now = count(), count(1), 0
+        self._tokens, self._beats, self.now = count(), count(1), BEGIN_NS
         self.telemetry: Columns = {}
         assert self.command("IDENTIFY") == "OK"  # which makes it the owner
 

@@ -215,3 +215,47 @@ def test_a_lock_gives_way_with_the_current() -> None:
     assert host.set(open_current=4.0) == "OK"
     host.run(0.5)
     assert abs(host.core.place[1]) < 10 * DEG  # it turns in
+
+
+def test_a_restart_forgets_zeros_and_parameters() -> None:
+    """As after power-on: OFF, the mover rolls out without currents, and nothing is held before its zeros are found anew."""
+    host = Host(faults=("reboot@12",))
+    host.hold()
+    assert host.set(x_rate=0.02, x_target=0.013) == "OK"
+    while host.now < 13.3e9:
+        host.run(0.1)
+    host.run(0.6)
+    assert (host.device.state, host.core.homed) == ("OFF", (False, False))
+    assert host.device.parameters.values["x_rate"] == 0.08
+    assert host.telemetry["tick"][-1] * 5e-5 < 1
+    assert host.command("ENABLE") == "OK"
+    assert host.command("HOLD") == "WRONG_STATE"
+
+
+def test_a_heartbeat_whose_counter_stands_still_is_none() -> None:
+    host = Host(faults=("stuck-heartbeat@10",))
+    host.hold()
+    assert host.set(x_wave=1, x_amplitude=2e-3) == "OK"
+    assert host.command("MOVE") == "OK"
+    while host.now < 11.5e9:
+        host.run(0.1)
+    host.run(1)
+    assert (host.device.state, host.device.fault) == ("FAULT", "HEARTBEAT_LOST")
+
+
+def test_a_sample_says_what_was_read_a_tick_before() -> None:
+    """Beside a capture, whose ticks are the same: the reading of a sample stands there from the tick before it on."""
+    host = Host()
+    host.hold()
+    assert host.set(x_wave=1, x_amplitude=5e-3, x_period=1.0) == "OK"
+    assert host.command("MOVE") == "OK"
+    layout = host.arm(("x", "force_asked"), 8000, "NOW", "x", 0.0, before=0)
+    host.run(0.5)
+    told = host.captured(layout)
+    assert host.device.captures is not None
+    at = host.telemetry["tick"].astype(int) - host.device.captures.memory.first_tick
+    within = np.flatnonzero((at > 1) & (at < 8000))[1:]
+    assert len(within) > 300
+    assert told["x"][at[within] - 1] == pytest.approx(host.telemetry["x"][within], abs=1e-9)
+    assert told["x"][at[within] - 2] == pytest.approx(host.telemetry["x"][within - 1], abs=1e-9)
+    assert told["force_asked"][at[within] - 1] == pytest.approx(host.telemetry["force_asked"][within], abs=6e-4)

@@ -60,7 +60,7 @@ def test_defects_are_harmless_unless_they_are_planted() -> None:
         "hanger_off_at_zero",
         "integrator_factor",
     }
-    elsewhere = ("factor_", "mass_error", "hook_", "lever_")
+    elsewhere = ("factor_", "mass_error", "hook_", "lever_", "reference_")
     for name, harmless in DEFECTS.items():
         if name not in told and not name.startswith(elsewhere):
             planted = RLSRM.params(truth.values, {**DEFECTS, name: 2.0 if harmless else 1.0})
@@ -189,3 +189,12 @@ def test_a_planted_fault_takes_the_currents_off() -> None:
 def test_names_of_phases_are_those_of_the_rig_file() -> None:
     assert RIG.capabilities.phase_test is not None
     assert tuple(name.lower() for name in RIG.capabilities.phase_test.phases) == NAMES
+
+
+def test_a_shaft_whose_far_end_is_high_slides_to_the_near_one() -> None:
+    """1 mrad of 3.35 kg: 33 mN towards -x, or 0.5 g t^2 of it where nothing rubs."""
+    host = Host(coulomb=0.0, viscous_x=0.0, **{"shaft.tilt": 1e-3})
+    begin, tick = host.core.place[0], host.core.tick
+    host.run(0.4)
+    since, before = host.core.tick * 5e-5, tick * 5e-5
+    assert host.core.place[0] - begin == pytest.approx(-0.5e-3 * G * (since**2 - before**2), rel=1e-6)

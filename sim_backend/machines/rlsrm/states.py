@@ -128,7 +128,7 @@ class StageStates:
         self._leaving = False
         if name == "DISABLE":
             self._owner.armed = False
-        else:
+        elif not self._owner.armed:  # ENABLE; or what was made safe and held is taken up again
             self._owner.arm(self._plant.tick)
         return True
 
