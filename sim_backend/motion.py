@@ -12,7 +12,7 @@ import numpy.typing as npt
 from bench.rigfile import RigFile
 from sim_backend.loads_motion import LoadsAsked
 from sim_backend.mission_motion import GateAsked, MissionAsked
-from sim_backend.stage_motion import SinesFollowed, StepsFollowed
+from sim_backend.stage_motion import DecouplingAsked, SinesFollowed, StepsFollowed
 
 Numbers = Mapping[str, float]
 Complex = npt.NDArray[np.complex128]
@@ -224,6 +224,8 @@ class Motions:
         loads: compliance, friction, scale of the force and answers to loads, by quantity and where.
         inductances: constants of a map of inductances, as encoders read places, by quantity and where.
         stators: where phases draw the shaft, by quantity and where.
+        decoupling: of an axis that is held, its largest `excursion` and the moved one's `swing`, effective value `cross`,
+            `peak` and `slope` of what crosses over.
         speeds: at the torque limit, by sharing: `speed` rad/s, `bound` A of the torque current, `ripple` rad/s.
     """
 
@@ -254,6 +256,7 @@ class Motions:
     stators: Callable[[RigFile, Any], Mapping[tuple[str, str], float]] | None = None
     following: Callable[[RigFile, Any, StepsFollowed | SinesFollowed], Mapping[tuple[str, str], float]] | None = None
     runout: Callable[[RigFile, Any, Sequence[float]], Mapping[tuple[str, str, float], complex]] | None = None
+    decoupling: Callable[[RigFile, Any, DecouplingAsked], Mapping[str, float]] | None = None
 
 
 NONE = Motions()

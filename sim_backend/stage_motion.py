@@ -42,3 +42,19 @@ class SinesFollowed:
     commands: Sequence[tuple[int, str, float]]
     windows: Sequence[StageWindow]
     period_rows: int
+
+
+@dataclass(frozen=True)
+class DecouplingAsked:
+    """An axis of a stage that is `moved` through a sine while another one is `held` at its zero: `settings` as those of steps,
+    `amplitude` m or rad, how many `periods` are looked at after one, above which share of its greatest speed it counts as
+    `sliding`, and the frequency, Hz, at which the smoothed force has half of what it was."""
+
+    settings: Numbers
+    moved: str
+    held: str
+    amplitude: float
+    period_s: float
+    periods: int
+    sliding: float
+    smooth_hz: float

@@ -223,6 +223,17 @@ PULL_RATIO = (
     "to 0.66 µm.",
     "Force constants of both planes apart: no set point tells them, only what they have together.",
 )
+DECOUPLING = (
+    "The scale of the controller's map beyond the plan's uncertainty of it: its newtons are what the cross force is told in, "
+    "and 5 % of it are 5 %. Load cells or weights tell.",
+    "Where the moved axis turns, both axes stick and no force is seen: the cross force there is in no result. The excursion "
+    "has the whole period.",
+    "A constant force on the held axis, by tilt or a cable, is none of the motion; nor is the mean of what the motion puts on "
+    "it.",
+    "Edges of counts and the encoder's zero: an excursion is from the set point as the encoder has it. Edges that lie half a "
+    "count off put the true place off by as much, for good.",
+    "Other motions: an excursion is that of this sine, about these places.",
+)
 LOAD_RESPONSE = (
     "An error that is common to all masses or to both arms, the same share of each, changes compliance and scale of the force "
     "by that share. One mass that is off by as little as the plan's max_apart lets pass changes them by up to two thirds of "
