@@ -36,7 +36,7 @@ class Static:
     """Of one axis: the loads in their order, `force` (J,) N or N m by the certificates, which of them are `used`, the pairs of
     approaches, the line of deviations and of forces given over the used loads; `moved` (J,), how far the shortest approach
     under each load went, of the lead; `rubbed`, by source N per N of load by which friction grows beyond what is stated, and
-    its u."""
+    its standard uncertainty; `by_mass`, compliances by each mass alone."""
 
     axis: StageAxis
     loads: tuple[Put, ...]
