@@ -80,7 +80,7 @@ def of_results(found: Sequence[Stator], rests: Sequence[Rest], rig: RigFile, pla
     worst = max(rests, key=lambda r: r.went)
     if worst.went > COUNTS * count + 1e-9:
         text = f"the shaft went on by {math.degrees(worst.went):.2g}° while it was read. Ramp slower."
-        yield Finding("not-at-rest", text, worst.approach.name, Effect.INDETERMINATE)
+        yield Finding("shaft-not-at-rest", text, worst.approach.name, Effect.INDETERMINATE)
 
 
 def _of_stator(s: Stator, plan: Plan) -> Iterator[Finding]:

@@ -51,7 +51,7 @@ def of_signals(taken: Sequence[Taken], rig: RigFile, plan: Plan) -> Iterator[Fin
             return
         if other := [s for s in t.states if rig.binding.mode(s) != HELD]:
             yield Finding(
-                "not-held", f"the controller was in {', '.join(other)} while it was read.", name, Effect.ERROR
+                "axis-not-held", f"the controller was in {', '.join(other)} while it was read.", name, Effect.ERROR
             )
             return
     lost, expected = np.array([(t.lost, t.expected) for t in taken], dtype=float).T
@@ -94,7 +94,7 @@ def _rest(t: Taken, plan: Plan) -> Iterator[Finding]:
         most = in_words(float(np.nanmax(t.moved)), unit)
         text = (f"before {count} of {t.moved.size} readings it moved by up to {most} within "
                 f"{plan.rest_s:g} s, {in_words(may, unit)} allowed. Dwell longer.")  # fmt: skip
-        yield Finding("not-at-rest", text, one.axis.name, Effect.INDETERMINATE, concerned(t))
+        yield Finding("axis-not-at-rest", text, one.axis.name, Effect.INDETERMINATE, concerned(t))
     went = np.abs(t.counted - t.before)
     if (count := int((went > may).sum())) > 0:
         text = (f"in {count} of {went.size} readings it stood up to {in_words(float(np.nanmax(went)), unit)} elsewhere than "

@@ -223,6 +223,17 @@ PULL_RATIO = (
     "to 0.66 µm.",
     "Force constants of both planes apart: no set point tells them, only what they have together.",
 )
+DECOUPLING = (
+    "The scale of the controller's map beyond the plan's uncertainty of it: its newtons are what the cross force is told in, "
+    "and 5 % of it are 5 %. Load cells or weights tell.",
+    "Where the moved axis turns, both axes stick and no force is seen: the cross force there is in no result. The excursion "
+    "has the whole period.",
+    "A constant force on the held axis, by tilt or a cable, is none of the motion; nor is the mean of what the motion puts on "
+    "it.",
+    "Edges of counts and the encoder's zero: an excursion is from the set point as the encoder has it. Edges that lie half a "
+    "count off put the true place off by as much, for good.",
+    "Other motions: an excursion is that of this sine, about these places.",
+)
 LOAD_RESPONSE = (
     "An error that is common to all masses or to both arms, the same share of each, changes compliance and scale of the force "
     "by that share. One mass that is off by as little as the plan's max_apart lets pass changes them by up to two thirds of "
@@ -261,4 +272,18 @@ FOLLOWING = (
     "An encoder that gives the next lower count in place of the nearest: all places are half a count farther than they read.",
     "Time is the controller's: a clock that is fast by 1e-4 makes times and lags shorter by that share.",
     "The machine as it is then: friction that changes by 10 % moves what is left without integrators by up to as much.",
+)
+AXIS_FRICTION = (
+    "A weight that is not what its label says, or pulls the wrong way by both its pulleys: all friction by its share.",
+    "Friction that is not alike everywhere: results are means over the windows of the passes.",
+    "Friction that rises towards standstill (Stribeck): the line over the rates is told to no speed.",
+    "A map of the controller whose error grows with the force by more than saturation: what a newton is under the load is "
+    "taken for what it is without.",
+    "Time is the controller's: a clock that is fast by 1e-4 makes viscous friction greater by that share.",
+)
+AXIS_INERTIA = (
+    "A part that is not what its certificate says, or turns about another axis than the shaft: results by its share.",
+    "Something beside the part that is put on with it, as screws: their share of the part.",
+    "Friction that goes with the place: what is in phase with it there is taken for inertia.",
+    "Time is the controller's: it is the same with and without the part, and falls out.",
 )

@@ -55,7 +55,7 @@ def of_groups(groups: Sequence[Group], rig: RigFile, plan: Plan) -> Iterator[Fin
         worst = max(max(f.ahead.value, f.behind.value) for f in g.found)
         if worst > FOLLOWED * amplitude(g.axis, plan):
             text = f"the axis is up to {told(g.axis, worst)} off, more than half of the amplitude: it does not follow"
-            yield Finding("sine-not-followed", text, g.where)
+            yield Finding("axis-lags-its-sine", text, g.where)
     yield from of_forces(rig, by_axis([g.ride for g in groups]))
     for axis in {g.axis.name: g.axis for g in groups}.values():
         count, half = told(axis, pitch_of(axis)), told(axis, half_count(axis))

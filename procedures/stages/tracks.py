@@ -167,7 +167,7 @@ def of_signals(tracks: Mapping[str, Sequence[Track]], max_lost: float) -> Iterat
     for where, t in every:
         if other := [m for m in t.modes if m not in HELD]:
             text = f"the controller was in {', '.join(other)}: it did not hold the axes"
-            yield Finding("not-held", text, where, Effect.ERROR)
+            yield Finding("axis-not-held", text, where, Effect.ERROR)
             return
     lost, expected = (np.array([getattr(t, k) for _, t in every], dtype=float) for k in ("lost", "expected"))
     yield from signals.losses(lost, expected, max_lost, lambda share: every[int(np.argmax(share))][0])

@@ -32,7 +32,7 @@ def of_moves(moves: Sequence[Move], rig: RigFile, plan: Plan) -> Iterator[Findin
     expected = sum(per_mode * len(m.axes) for m in modes_of(rig, plan))
     if len(moves) < expected or any(len(m.track.t) < 3 for m in moves):
         text = f"found {len(moves)} moves of axes; expected {expected}: the run was stopped early"
-        yield Finding("steps-missing", text, STEP, Effect.ERROR)
+        yield Finding("axis-steps-missing", text, STEP, Effect.ERROR)
         return
     yield from of_signals(by_axis(moves), plan.max_lost)
     for m in moves:
@@ -80,7 +80,7 @@ def _of_group(g: Group, plan: Plan) -> Iterator[Finding]:
         text = (f"in {count} of {len(g.found)} steps the axis does not rest in the last {plan.rest_s:g} s: it moves by up to "
                 f"{told(axis, restless)}. Wait longer (dwell_s); if it swings, look at the gains.")  # fmt: skip
         what = tuple(f"{name}{end}@{g.where}" for name in (ERROR, TRUE) for end in ("", "_angle"))
-        yield Finding("not-at-rest", text, g.where, Effect.INDETERMINATE, what)
+        yield Finding("still-moving", text, g.where, Effect.INDETERMINATE, what)
     if late := sum(f.settled is None for f in g.found):
         text = f"in {late} of {len(g.found)} steps the axis is outside ±{plan.band:.0%} of the step at the end"
         yield Finding("not-settled", text, g.where, Effect.INDETERMINATE, (f"{TIME}@{g.where}",))

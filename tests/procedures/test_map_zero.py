@@ -94,7 +94,7 @@ def test_planted() -> None:
     assert loud(told(stuck)) == {"shaft-stuck"}
     assert loud(told([replace(r, current=-r.level) for r in some])) == {"current-reversed"}
     assert loud(told([replace(r, current=0.5 * r.level) for r in some])) == {"current-not-given"}
-    assert loud(told([replace(some[0], went=0.02), *some[1:]])) == {"not-at-rest"}
+    assert loud(told([replace(some[0], went=0.02), *some[1:]])) == {"shaft-not-at-rest"}
     assert loud(told([replace(some[0], states=("HOLDING",)), *some[1:]])) == {"loops-on"}
     assert loud(told([replace(some[0], lost=50), *some[1:]])) == {"missing-samples"}
     assert loud(told([])) == {"no-approaches"}

@@ -112,7 +112,7 @@ def test_not_at_rest_and_moved() -> None:
     t = taken(sound())
     moved = t.moved.copy()
     moved[0, 2, 1] = 5 * UM
-    assert codes(replace(t, moved=moved)) == {"not-at-rest"}
+    assert codes(replace(t, moved=moved)) == {"axis-not-at-rest"}
     before = t.before.copy()
     before[1, 0, 0] -= 5 * UM
     assert codes(replace(t, before=before)) == {"moved-while-read"}
@@ -150,7 +150,7 @@ def test_missing_and_not_held() -> None:
     read = t.read.copy()
     read[0, 0, 0] = np.nan
     assert codes(replace(t, read=read)) >= {"approaches-missing"}
-    assert codes(replace(t, states=("HOLDING", "FAULT"))) == {"not-held"}
+    assert codes(replace(t, states=("HOLDING", "FAULT"))) == {"axis-not-held"}
 
 
 def test_targets_on_counts_and_too_few() -> None:

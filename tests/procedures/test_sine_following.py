@@ -125,7 +125,7 @@ def test_what_is_told_of_bad_data() -> None:
     assert of_rides(rides(periods=3)) == {"periods-missing"}
     some, plan = rides(followed_by=0.3)
     told = {f.code: f.effect for f in checks.of_groups(grouped(some, plan), RLSRM, plan)}
-    assert told == {"sine-not-followed": Effect.NOTE, "reading-quantised": Effect.NOTE}
+    assert told == {"axis-lags-its-sine": Effect.NOTE, "reading-quantised": Effect.NOTE}
     ramp = np.abs((T * 0.4) % 2 - 1)
     assert off_sine(T, ramp, PERIOD, 1.0) > 0.05
 

@@ -155,12 +155,12 @@ def test_what_is_told_of_bad_data() -> None:
     assert of_moves(moves()) == set()
     assert of_groups(moves()) == {"reading-quantised": Effect.NOTE}
     assert of_moves(moves(lost=10)) == {"missing-samples"}
-    assert of_moves(moves(states=("HOLDING", "FAULT"))) == {"not-held"}
+    assert of_moves(moves(states=("HOLDING", "FAULT"))) == {"axis-not-held"}
     assert of_moves(moves(read=False)) == {"never-moved"}
     assert of_moves(moves(sent=0.9)) == {"set-point-elsewhere"}
-    assert of_moves((moves()[0][:-1], moves()[1])) == {"steps-missing"}
-    assert of_groups(moves(rest=30e-6))["not-at-rest"] is Effect.INDETERMINATE
-    assert "not-at-rest" not in of_groups(moves(rest=15e-6))
+    assert of_moves((moves()[0][:-1], moves()[1])) == {"axis-steps-missing"}
+    assert of_groups(moves(rest=30e-6))["still-moving"] is Effect.INDETERMINATE
+    assert "still-moving" not in of_groups(moves(rest=15e-6))
     assert of_groups(moves(offset=-12e-3))["not-followed"] is Effect.NOTE
     assert of_groups(moves(offset=-0.5e-3))["not-settled"] is Effect.INDETERMINATE
 

@@ -49,7 +49,7 @@ def steps(done: Simulated) -> Found:
     """Of the same machine that is sent the same way, of the steps that count."""
     from procedures.stages.tracks import where_of, without
     from procedures.step_following.steps import STEP, UP, modes_of, places
-    from sim_backend.motion import StageWindow, StepsFollowed
+    from sim_backend.stage_motion import StageWindow, StepsFollowed
 
     recording, of = done.recording, done.drawn.machine.motions.following
     rig, plan = recording.rig, recording.plan
@@ -74,7 +74,7 @@ def sines(done: Simulated) -> Found:
     """Of the same machine that is sent the same way, of the periods that count."""
     from procedures.sine_following.steps import SINE, modes_of
     from procedures.stages.tracks import where_of, without
-    from sim_backend.motion import SinesFollowed, StageWindow
+    from sim_backend.stage_motion import SinesFollowed, StageWindow
 
     recording, of = done.recording, done.drawn.machine.motions.following
     rig, plan = recording.rig, recording.plan

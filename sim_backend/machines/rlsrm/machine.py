@@ -17,6 +17,7 @@ from sim_backend.machines.rlsrm.params import DEG, ControlParams, Each, Map, Pla
 from sim_backend.machines.rlsrm.plant import LOOP_TICKS, TICKS_S
 from sim_backend.machines.rlsrm.served import READINGS
 from sim_backend.machines.rlsrm.states import states
+from sim_backend.machines.rlsrm.truth_decoupling import decoupling
 from sim_backend.machines.rlsrm.truth_following import following
 from sim_backend.machines.rlsrm.truth_load import loads
 from sim_backend.machines.rlsrm.truth_map import of_map, of_zeros
@@ -186,5 +187,5 @@ RLSRM = Machine(
     radial=slice(0, 0), integral_gains=frozenset(("ki_x", "ki_angle")), turns=False, channels=CHANNELS, places=places,
     spoil=spoil, supply_V=90.0, windings={}, copper_W=copper_W, operator=operator, traced=lambda _: READINGS, daily=DAILY,
     controls=SETTABLE, levitates=False, tick_s=1 / TICKS_S, period_s=LOOP_TICKS / TICKS_S, states=states,
-    motions=Motions(loads=loads, inductances=of_map, stators=of_zeros, following=following),
+    motions=Motions(loads=loads, inductances=of_map, stators=of_zeros, following=following, decoupling=decoupling),
 )  # fmt: skip

@@ -16,7 +16,7 @@ from sim_backend.machine import Truth
 from sim_backend.machines.rlsrm.device import SETTABLE, StagePlant
 from sim_backend.machines.rlsrm.params import PlantParams
 from sim_backend.machines.rlsrm.plant import AXES, LOOP_TICKS, TICKS_S, TRACE
-from sim_backend.motion import SinesFollowed, StageWindow, StepsFollowed
+from sim_backend.stage_motion import SinesFollowed, StageWindow, StepsFollowed
 
 ROW_S: Final = 1e-3
 BEAT_TICKS: Final = 20 * LOOP_TICKS

@@ -14,13 +14,13 @@ import numpy as np
 
 from bench.rigfile import RigFile
 from sim_backend.core.plant import Array
+from sim_backend.loads_motion import LoadedAxis, LoadsAsked
 from sim_backend.machine import Truth
 from sim_backend.machines.rlsrm.device import StagePlant, control_of
 from sim_backend.machines.rlsrm.operator import Attendant
 from sim_backend.machines.rlsrm.params import PlantParams
 from sim_backend.machines.rlsrm.plant import AXES, TRACE
 from sim_backend.machines.rlsrm.served import Served
-from sim_backend.motion_loads import LoadedAxis, LoadsAsked
 
 AT_REST, CHANGED = 2, 4  # times the plan's set points within a count, between which they lie
 GOLDEN: Final = 0.6180339887

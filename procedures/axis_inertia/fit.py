@@ -1,0 +1,91 @@
+"""The bare model: what an axis moves, from force and reading of sines, with and without a part that is known.
+
+The controller's map makes s F of a force F that it gives, and that comes later by a time tau, in which currents rise:
+
+    s F(t - tau) = J a(t) + D v(t) + C sign v(t) + b.
+
+The reading is fitted by harmonics, as friction makes more of them than the first, and differentiated there: v turns not where
+its first harmonic does, so that friction is not at right angles to the acceleration. About its turns the axis may stick, and
+friction is not C there: what is slow is left out. At a delay, J/s = y is a
+coefficient of a regression of F. With a part P on, y_2 - y_1 = P/s, and
+
+    J = P y_1/(y_2 - y_1),
+
+in which s is no more, nor the scale of the reading. s differs from sine to sine, as the places do, and all sines of an axis are
+to tell the same J. A delay that is taken wrongly turns acceleration into speed, which the regression has, too: it moves J by
+little, and is in the budget.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Take = npt.NDArray[np.intp]
+HARMONICS = 20
+SLOW = 0.3  # of the greatest speed: below it friction may be that of sticking
+DELAYS = (0.0, 2e-3)  # s, at which coefficients are worked out; between them they go straight
+
+
+def operators(t: Array, reading: Array, hz: float) -> tuple[float, Array, Array]:
+    """First amplitude of a reading (n,), and what a force is multiplied by to be inertia and Coulomb friction, (2, n) each, at
+    both DELAYS."""
+    turn = 2 * math.pi * hz * np.arange(1, HARMONICS + 1)
+
+    def harmonics(at: Array) -> Array:
+        return np.concatenate([np.exp(1j * np.outer(turn, at)).real, np.exp(1j * np.outer(turn, at)).imag])
+
+    design = np.concatenate([np.ones((1, len(t))), harmonics(t)]).T
+    found = np.linalg.lstsq(design, reading, rcond=None)[0][1:]
+    half = found[:HARMONICS] - 1j * found[HARMONICS:]
+    inertia, rubs = [], []
+    for delay in DELAYS:
+        wave = np.exp(1j * np.outer(turn, t + delay))
+        v, a = ((1j * turn) * half @ wave).real, (-(turn**2) * half @ wave).real
+        fast = np.abs(v) > SLOW * np.abs(v).max()
+        inverse = np.zeros((4, len(t)))
+        inverse[:, fast] = np.linalg.pinv(np.array([a, np.sign(v), v, np.ones_like(t)])[:, fast].T)
+        inertia.append(inverse[0])
+        rubs.append(inverse[1])
+    return float(abs(half[0])), np.array(inertia), np.array(rubs)
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Of one axis, bare and with the part, n repeats, m sines: force by the map per acceleration, and Coulomb friction by the
+    map, (2, n, m, 2) at both DELAYS."""
+
+    per: Array
+    rubs: Array
+
+
+@dataclass(frozen=True)
+class Moved:
+    """`each` (m,), J by each sine; `by_map` (2, m), J/s bare and with the part; friction `rubs` (2, m) by the map."""
+
+    each: Array
+    by_map: Array
+    rubs: Array
+
+    @property
+    def inertia(self) -> float:
+        """By the first sine."""
+        return float(self.each[0])
+
+
+def moved(a: Axis, part: float, delay: float, take: Take) -> Moved:
+    """At a delay of the force, by means over the repeats `take`."""
+    share = (delay - DELAYS[0]) / (DELAYS[1] - DELAYS[0])
+    by_map, rubs = (((1 - share) * x[..., 0] + share * x[..., 1])[:, take].mean(axis=1) for x in (a.per, a.rubs))
+    return Moved(part * by_map[0] / (by_map[1] - by_map[0]), by_map, rubs)
+
+
+def pseudo(values: Sequence[Array], whole: Array) -> Array:
+    """Of n results with one repeat left out each: what each repeat says by itself (Tukey), (n, q)."""
+    n = len(values)
+    return n * whole - (n - 1) * np.array(values)
