@@ -64,10 +64,16 @@ PROCEDURES = (
     _room("encoder-zero", "Electrical zero of each motor against its encoder, by steps of the current along the field"),
     _room("sensor-delay", "How late positions are read, by their phase against the currents that push"),
     _room("emf-constant", "Flux and emf constants of a mover's motors, and what the nameplate's flux is meant of"),
+    _room("map-zero", "Zeros of a reluctance machine's stators against its encoder, from both sides"),
+    _room("inductance-map", "Map of a reluctance machine's inductances, by pulses at a locked rotor"),
     _room("coil-map", "Coils, phases and actuators: is each where the controller takes it to be?"),
     _room("load-response", "Static compliance, friction, deviation and return of a positioned stage under known loads"),
+    _room("positioning", "Repeatability and accuracy of positioning after ISO 230-2, by a reference instrument"),
+    _room("step-following", "Steps of a positioned stage: static error, overshoot, settling"),
+    _room("sine-following", "Sines that a positioned stage follows: errors, amplitude ratio, lag"),
     _room("axis-friction", "Friction of a stage's axes, alone and where both move, by known loads"),
     _room("axis-inertia", "Mass and moment of inertia of what a stage moves, by sines and a known part"),
+    _room("decoupling", "Decoupling of a stage's axes: what a held one does, and what force crosses over to it"),
     _room("force-map", "Terms of the motor's force over displacement, currents and load"),
 )
 

@@ -26,6 +26,7 @@ RIGS = {
     "amb1dof": ("derivative", "estimator-compare"),
     "lira": ("coil-map", "encoder-zero", "unstable-pole", "loop-response", "mission", "gate-margin", "actuator-constant"),
     "lira-200v": ("current-step",),
+    "rlsrm": ("step-following", "sine-following", "decoupling"),
     "tsbs6": ("amb-calibration", "torque-constant", "spindown", "angle-step", "slew"),
 }  # fmt: skip
 FOREIGN = {

@@ -60,9 +60,8 @@ class Controller:
         self.capture: ControllerCapture | None = None
         if rig.capture is not None:
             upload = Upload(rig, link, self.requests, self.clock)
-            self.capture = ControllerCapture(
-                rig, rig.capture, self.requests, upload, session, self.telemetry, self.clock, self._wait
-            )
+            self.capture = ControllerCapture(rig, rig.capture, self.requests, upload, session, self.telemetry, self.clock,
+                                             self._wait)  # fmt: skip
 
     @property
     def recorder(self) -> Recorder | None:
@@ -280,11 +279,8 @@ class Controller:
             raise BenchError(f"the telemetry has no channel {channel}") from None
 
     def reach(self, name: str, goal: str, timeout_s: float, expected_s: float = 0.0) -> None:
-        """Send a command and wait for the state that it leads to, so long beyond the time that it is expected to take.
-
-        Raises:
-            StateNotReached: it is not reached; and as `command`.
-        """
+        """Send a command and wait for the state that it leads to, so long beyond what it is expected to take; raises
+        StateNotReached without it, and as `command`."""
         self.command(name)
         self.clock.sleep(expected_s)
         self.wait(lambda: self.mode == goal, timeout_s, lambda: StateNotReached(

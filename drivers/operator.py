@@ -11,12 +11,14 @@ from bench.errors import OperatorRefused
 from bench.procedure.roles import Load, Plane, Push, Side
 from bench.recording.recorder import Recorder
 from bench.rigfile.envelope import Envelope
+from drivers.answers import reading_of
 
 
 class LineOperator:
     """An operator that answers lines: `hang M2`, `hang -`, `hang HOOK M2`, `turn DEGREES`, `push DEGREES`,
     `push -`, `lever left M2`, `lever left -`, `mount ring`, `mount -`,
-    `attach inboard KG RAD`, `detach inboard`, `ask TEXT` (see the simulated backend's operators). `may_touch` raises while
+    `attach inboard KG RAD`, `detach inboard`, `read AXIS`,
+    `ask TEXT` (see the simulated backend's operators). `may_touch` raises while
     nobody may reach into the machine; `approach` makes sure of what holds a voltage in it, before anything is asked for, and
     tells by what."""
 
@@ -109,6 +111,27 @@ class LineOperator:
             return False
         self._note(action="push", **({"axis": way.axis, "angle_rad": way.angle_rad} if way is not None else {}))
         return True
+
+    def read(self, axis: str, instrument: str, unit: str) -> float:
+        """What a reference instrument shows of an axis now, SI; the other end answers `ok SECONDS NUMBER UNIT`, in a unit of
+        that kind.
+
+        Raises:
+            OperatorRefused: the other end cannot do it, or answers something else.
+        """
+        answer = self._request(f"read {axis}")
+        shown = (
+            reading_of(answer.split(maxsplit=2)[2], unit)
+            if answer.startswith("ok ") and answer.count(" ") >= 2
+            else None
+        )
+        if shown is None:
+            told = answer.strip() or "an empty line"
+            what = f"the operator was asked to read {instrument} of axis {axis}"
+            raise OperatorRefused(f"{what} and answers {told!r}; expected ok SECONDS NUMBER UNIT")
+        self._clock.sleep(float(answer.split()[1]))
+        self._note(action="read", axis=axis, value=shown)
+        return shown
 
     def _do(self, line: str, what: str) -> None:
         if (seen := self.approach()) and self.recorder is not None:

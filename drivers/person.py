@@ -12,6 +12,7 @@ from bench.errors import InterlockError, OperatorAbort
 from bench.procedure.roles import NOTHING, Load, Plane, Push, Side
 from bench.recording.recorder import Recorder
 from bench.rigfile.envelope import Envelope
+from drivers.answers import Misunderstood, after, degrees_of, reading_of, skipped, unknown
 from drivers.operator import LineOperator
 
 T = TypeVar("T")
@@ -80,7 +81,7 @@ class ConsoleOperator:
             f"The shaft levitates and stands. Turn it by hand until {degrees:g}° of its scale is at the mark; let it go.",
             "it stands there",
             angle_rad,
-            _Other("It stands at another angle: type its degrees.", _degrees),
+            _Other("It stands at another angle: type its degrees.", degrees_of),
         )
         if self._then is not None:
             self._then.turn(stands)
@@ -154,9 +155,25 @@ class ConsoleOperator:
             f"{LANDED} It will be lifted once its probes are known to count the right way. Push it by hand midway "
             f"between its rings {way.axis} ({counts}) until it touches them there, one that lies with about as much as it "
             "weighs, and hold it there.",
-            "it is held there", True, _Other("To leave it out, as it was shown before: type skip.", _skipped),
+            "it is held there", True, _Other("To leave it out, as it was shown before: type skip.", skipped),
         )  # fmt: skip
         return done and (self._then is None or self._then.push(way))
+
+    def read(self, axis: str, instrument: str, unit: str) -> float:
+        """What a reference instrument shows of an axis now, SI: a person types it, in `unit` or with another one of its kind. A
+        simulated rig's own operator reads it in its place.
+
+        Raises:
+            OperatorAbort: the person answered stop.
+        """
+        if self._then is not None:
+            return self._then.read(axis, instrument, unit)
+        asked = after(self.standing(), f"Read {instrument} of axis {axis}; do not touch the machine.")
+        question = f"{asked}\nType the number, in {unit} or with its unit; stop ends the run."
+        answer = self._answer(question)
+        while (shown := reading_of(answer, unit)) is None:
+            answer = self._answer(f"{unknown(answer)}\n{question}")
+        return shown
 
     def ask(self, question: str) -> bool:
         """Whether the person says yes.
@@ -164,10 +181,10 @@ class ConsoleOperator:
         Raises:
             OperatorAbort: the person answered stop.
         """
-        asked = f"{_after(self.standing(), question)}\nType yes or no, or stop to end the run."
+        asked = f"{after(self.standing(), question)}\nType yes or no, or stop to end the run."
         answer = self._answer(asked)
         while answer not in (*YES, *NO):
-            answer = self._answer(f"{_unknown(answer)}\n{asked}")
+            answer = self._answer(f"{unknown(answer)}\n{asked}")
         return answer in YES
 
     def goes_on(self, wrong: str) -> bool:
@@ -230,7 +247,7 @@ class ConsoleOperator:
     def _confirmed(self, what: str, when: str, asked: T, other: _Other[T]) -> T:
         """Make sure that the machine may be touched, and ask until it is done as asked, or the person says what was done
         instead."""
-        asks = _after(self.approach() or self.standing(), what)
+        asks = after(self.approach() or self.standing(), what)
         more = ", ? for more" if other.more else ""
         question = f"{asks}\nPress Enter when {when}, or type stop to end the run{more}."
         answer = self._answer(question)
@@ -238,7 +255,7 @@ class ConsoleOperator:
             try:
                 if (really := other.read(answer)) is not None:
                     return really
-                why = other.more if answer == "?" else f"{_unknown(answer)} {other.more}".rstrip()
+                why = other.more if answer == "?" else f"{unknown(answer)} {other.more}".rstrip()
             except Misunderstood as error:
                 why = str(error)
             answer = self._answer(f"{why}\n{question}")
@@ -265,30 +282,3 @@ class _Other(Generic[T]):
 
     more: str = ""
     read: Callable[[str], T | None] = lambda _: None
-
-
-def _after(said: str, what: str) -> str:
-    """What is asked, after what is told of the machine."""
-    return f"{said}\n{what}" if said else what
-
-
-def _degrees(answer: str) -> float | None:
-    """rad of an answer in degrees, None where it is none."""
-    try:
-        degrees = float(answer.removesuffix("°"))
-    except ValueError:
-        return None
-    return math.radians(degrees) if math.isfinite(degrees) else None
-
-
-def _skipped(answer: str) -> bool | None:
-    """False where something is left out, None where the answer says something else."""
-    return False if answer == "skip" else None
-
-
-class Misunderstood(Exception):
-    """Why an answer asks for another."""
-
-
-def _unknown(answer: str) -> str:
-    return f"{answer!r} is no answer here." if answer else "An empty line is no answer here."

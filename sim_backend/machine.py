@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -133,7 +133,8 @@ class Machine:
 
 @dataclass(frozen=True)
 class Truth:
-    """Every drawn value by name, planted defects, and what follows from them. `seed` says which machine, `visit` which day."""
+    """Every drawn value by name, planted defects, and what follows from them. `seed` says which machine, `visit` which day.
+    `seen`: axis and true place, m or rad, of each reading of an instrument outside the loop, in their order."""
 
     seed: int
     values: Mapping[str, float]
@@ -142,6 +143,7 @@ class Truth:
     quantities: Mapping[str, float]
     machine: Machine
     visit: int = 0
+    seen: list[tuple[str, float]] = field(default_factory=list, compare=False, repr=False)
 
     @property
     def noise(self) -> int:

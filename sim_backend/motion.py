@@ -10,7 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.rigfile import RigFile
-from sim_backend.motion_loads import LoadsAsked
+from sim_backend.loads_motion import LoadsAsked
+from sim_backend.mission_motion import GateAsked, MissionAsked
+from sim_backend.stage_motion import DecouplingAsked, SinesFollowed, StepsFollowed
 
 Numbers = Mapping[str, float]
 Complex = npt.NDArray[np.complex128]
@@ -165,27 +167,6 @@ class SpeedsAsked:
 
 
 @dataclass(frozen=True)
-class MissionAsked:
-    """A mission: `settings` as those of steps. Times from the firmware's start on, s: when it is switched on, `on_s`, and
-    lifts, `lift_s`, from where it is `lying`, m by channel, as probes read it; `commands` (when, "z" or "angle", to where, rate
-    and rise) until `end_s`; `repeats` (begin, end), and `rests` (begin, end, which place). `places` are what both are called,
-    `sent` where the mover is sent, m and rad. The gate, m, and its time, s."""
-
-    settings: Numbers
-    on_s: float
-    lift_s: float
-    lying: Numbers
-    commands: Sequence[tuple[float, str, float, float, float]]
-    end_s: float
-    repeats: Sequence[tuple[float, float]]
-    rests: Sequence[tuple[float, float, int]]
-    places: Sequence[str]
-    sent: Sequence[tuple[float, float]]
-    gate_m: float
-    gate_s: float
-
-
-@dataclass(frozen=True)
 class CurrentAsked:
     """Steps of currents that the controller regulates, of the machine at rest: by place the current, as the machine calls it,
     and the proportional gain of its loop, V/A; the `size` of a large step and of a `small` one, A; what of the response counts,
@@ -214,22 +195,6 @@ class LoopsAsked:
 
 
 @dataclass(frozen=True)
-class GateAsked:
-    """A levitated mover at rest, looked at for `windows` times the gate's time `gate_s` at each of the `places`, by name m and
-    rad; `settings` as those of steps, the parameters of the set points `place` and `angle`; the gate, m. `limits`: by probe
-    whose catch margin is asked for, the controller's greatest force, N."""
-
-    settings: Numbers
-    places: Mapping[str, tuple[float, float]]
-    place: str
-    angle: str
-    gate_m: float
-    gate_s: float
-    windows: int
-    limits: Numbers
-
-
-@dataclass(frozen=True)
 class Motions:
     """The truths of motion of one machine; None: it has none of that kind. Each takes the rig and what was drawn for it (a
     `Truth`) first.
@@ -254,8 +219,13 @@ class Motions:
         gates: what the gate and the catch have to spare, by quantity and where.
         pulls: of where a channel along and one around read, what holds a shaft that magnets pull, by quantity and where.
         cogging: harmonics of it along and around, by quantity and where, of a shaft turned at rad/s at a place, m.
+        following: what axes do that are sent to and fro or follow sines, by quantity and where.
         runout: what turns with the shaft, vectors by quantity, plane and place along, m.
         loads: compliance, friction, scale of the force and answers to loads, by quantity and where.
+        inductances: constants of a map of inductances, as encoders read places, by quantity and where.
+        stators: where phases draw the shaft, by quantity and where.
+        decoupling: of an axis that is held, its largest `excursion` and the moved one's `swing`, effective value `cross`,
+            `peak` and `slope` of what crosses over.
         speeds: at the torque limit, by sharing: `speed` rad/s, `bound` A of the torque current, `ripple` rad/s.
     """
 
@@ -282,7 +252,11 @@ class Motions:
     pulls: Callable[[RigFile, Any, float, float], Mapping[tuple[str, str], float]] | None = None
     cogging: Callable[[RigFile, Any, float, float], Mapping[tuple[str, str], float]] | None = None
     loads: Callable[[RigFile, Any, LoadsAsked], Mapping[tuple[str, str], float]] | None = None
+    inductances: Callable[[RigFile, Any], Mapping[tuple[str, str], float]] | None = None
+    stators: Callable[[RigFile, Any], Mapping[tuple[str, str], float]] | None = None
+    following: Callable[[RigFile, Any, StepsFollowed | SinesFollowed], Mapping[tuple[str, str], float]] | None = None
     runout: Callable[[RigFile, Any, Sequence[float]], Mapping[tuple[str, str, float], complex]] | None = None
+    decoupling: Callable[[RigFile, Any, DecouplingAsked], Mapping[str, float]] | None = None
 
 
 NONE = Motions()

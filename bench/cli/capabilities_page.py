@@ -25,7 +25,7 @@ BEGIN = "<!-- made by: python -m bench.cli.capabilities_page docs/reference/rig-
 END = "<!-- end -->\n"
 COLUMNS = ("set_points", "path", "injection", "loop_injection", "bias", "settings.law", "settings.compensation", "gains",
            "flatness", "model", "current_limit", "current_steps", "coil_map", "hold", "force_currents",
-           "angle", "motion", "motor", "status", "mark", "turned", "capture", "masses")  # fmt: skip
+           "angle", "motion", "positioning", "reference", "motor", "status", "mark", "turned", "capture", "masses")  # fmt: skip
 NOTE = """\
 
 `turned` is a motor or a drive in the role `rotation` or `drive`, `masses` are certified ones to hang, `capture` is the

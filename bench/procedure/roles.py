@@ -120,6 +120,9 @@ class Operator(Protocol):
     ) -> (
         bool
     ): ...  # the landed shaft, aside until it touches; returns while it is held; None: let go; False: nobody does
+    def read(
+        self, axis: str, instrument: str, unit: str
+    ) -> float: ...  # what an instrument shows now, SI; its usual unit
     def ask(self, question: str) -> bool: ...  # yes or no
     def goes_on(self, wrong: str) -> bool: ...  # whether a run goes on that shows this; where nobody is, it does not
 

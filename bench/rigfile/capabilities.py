@@ -15,6 +15,7 @@ from bench.rigfile.bit import Bit
 from bench.rigfile.capabilities_of_coils import CoilMap
 from bench.rigfile.capabilities_of_loops import CurrentStep, ForceCurrent, Hold, LoopInjection, Motion
 from bench.rigfile.capabilities_of_power import DcLink
+from bench.rigfile.capabilities_of_reference import ReferenceInstrument
 from bench.rigfile.capabilities_of_stages import (
     AXIS_PARAMETERS,
     TEST_PARAMETERS,
@@ -164,6 +165,7 @@ class Capabilities(Part):
     force_currents: Mapping[Name, ForceCurrent] = {}
     coil_map: CoilMap | None = None
     dc_link: DcLink | None = None
+    reference: Mapping[Name, ReferenceInstrument] = {}
     positioning: Positioning | None = None
     phase_test: PhaseTest | None = None
     model: Mapping[Name, str] = {}

@@ -35,7 +35,7 @@ POSITIVE = ("gap", "clearance", "radius", "length", "mass", "polar_inertia", "tr
 LIKELY = {"gap": (1e-6, 1e-2), "clearance": (1e-6, 0.1), "radius": (1e-4, 10.0), "at": (0.0, 10.0), "by": (0.0, 10.0),
           "centre_of_mass": (0.0, 10.0)}  # m; what is beyond is a slip of the unit  # fmt: skip
 TABLES = ("shaft", "bearings", "probes", "mark", "rings", "balancing", "coupling", "hooks", "levers", "motors")
-"""Tables with numbers of one kind each; those of encoders are looked at with the axes that they are."""
+# Those of encoders are looked at with the axes that they are (check_stages).
 
 Found = tuple[str, str, str]
 

@@ -28,7 +28,10 @@ def of_passes(passes: Sequence[Pass], rig: RigFile, plan: Plan) -> Iterator[Find
     for p in passes:
         if other := [s for s in p.states if rig.binding.mode(s) not in HELD]:
             yield Finding(
-                "not-held", f"the controller was in {', '.join(other)}: it did not hold the axes", p.where, Effect.ERROR
+                "axis-not-held",
+                f"the controller was in {', '.join(other)}: it did not hold the axes",
+                p.where,
+                Effect.ERROR,
             )
             return
     lost, expected = np.array([(p.lost, p.expected) for p in passes], dtype=float).T

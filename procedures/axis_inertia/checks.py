@@ -30,7 +30,10 @@ def of_sines(sines: Sequence[Sine], rig: RigFile, plan: Plan) -> Iterator[Findin
     for s in sines:
         if other := [name for name in s.states if rig.binding.mode(name) not in HELD]:
             yield Finding(
-                "not-held", f"the controller was in {', '.join(other)}: it did not hold the axes", s.where, Effect.ERROR
+                "axis-not-held",
+                f"the controller was in {', '.join(other)}: it did not hold the axes",
+                s.where,
+                Effect.ERROR,
             )
             return
     lost, expected = np.array([(s.lost, s.expected) for s in sines], dtype=float).T

@@ -154,11 +154,11 @@ def _contradictions(s: Static, rests: Sequence[Rest], plan: Plan) -> Iterator[Fi
         text = (f"the force that the controller gives goes by {spring:.3f} times stiffness and deviation, 1 expected: an "
                 "integrator is on, or it gives less than its loop asks for.")  # fmt: skip
         yield Finding("no-spring", text, name, Effect.INDETERMINATE, _static(name, turns))
-    value, u = s.rubbed
-    if not turns and value > RUBS + SURE * u:
-        text = (f"friction grows by {value:.1%} of the load beyond what the pulleys are stated to rub with, {RUBS:.0%} "
-                "allowed: a pulley is stiff, or its cord rubs.")  # fmt: skip
-        yield Finding("pulley-rubs", text, name, Effect.INDETERMINATE, _static(name, turns))
+    for source, (value, u) in s.rubbed.items():
+        if not turns and value > RUBS + SURE * u:
+            text = (f"friction grows by {value:.1%} of the load beyond what the pulley is stated to rub with, {RUBS:.0%} "
+                    "allowed: it is stiff, or its cord rubs.")  # fmt: skip
+            yield Finding("pulley-rubs", text, f"{name}, {source}", Effect.INDETERMINATE, _static(name, turns))
 
 
 def _unlike_ways(s: Static, plan: Plan) -> Iterator[Finding]:

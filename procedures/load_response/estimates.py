@@ -35,7 +35,8 @@ MOVED = 0.2  # of the lead: an approach that went less far did not leave frictio
 class Static:
     """Of one axis: the loads in their order, `force` (J,) N or N m by the certificates, which of them are `used`, the pairs of
     approaches, the line of deviations and of forces given over the used loads; `moved` (J,), how far the shortest approach
-    under each load went, of the lead; `rubbed`, N per N of load by which friction grows, and its standard uncertainty."""
+    under each load went, of the lead; `rubbed`, by source N per N of load by which friction grows beyond what is stated, and
+    its u."""
 
     axis: StageAxis
     loads: tuple[Put, ...]
@@ -45,7 +46,7 @@ class Static:
     deviation: Slope
     given: Slope
     moved: Array
-    rubbed: tuple[float, float]
+    rubbed: Mapping[str, tuple[float, float]]
     by_mass: tuple[float, ...]
 
 
@@ -112,7 +113,7 @@ def static(axis: StageAxis, rests: Sequence[Rest], rig: RigFile, plan: Plan) -> 
     line, given = fit.slope(forces[lined], pairs.mean[lined]), fit.slope(forces[lined], pairs.given[lined])
     moved = np.minimum(up[..., 2], down[..., 2]).min(axis=1) / lead(axis, plan)
     mass = np.array([-1 if not q.label else masses(axis, plan).index(q.label) for q in loads])
-    growth = _growth(np.abs(forces), pairs.half / line.value, rubs)
+    growth = _growth(loads, forces, pairs.half / abs(line.value), rubs)
     by_mass = tuple(fit.pairwise(forces[used], pairs.mean[used], mass[used]))
     return Static(axis, loads, forces, used, pairs, line, given, moved, growth, by_mass)
 
@@ -125,14 +126,18 @@ def beyond_friction(forces: Array, pairs: Pairs) -> Array:
     return used
 
 
-def _growth(force: Array, held: Array, rubs: Array) -> tuple[float, float]:
-    """Slope of friction over the load, beyond what the pulleys are stated to rub with, and its standard uncertainty."""
-    rest = held.mean(axis=1) - rubs
-    away = force - force.mean()
-    square = float(away @ away)
-    value = float(away @ rest) / square
-    left = rest - rest.mean() - value * away
-    return value, math.sqrt(float(left @ left) / max(len(force) - 2, 1) / square)
+def _growth(loads: Sequence[Put], force: Array, held: Array, rubs: Array) -> dict[str, tuple[float, float]]:
+    """By source, of friction under its loads less that under none: its share of the loads beyond what is stated of its pulley,
+    and the standard uncertainty of that."""
+    each, _ = fit.uneven(held)
+    out = {}
+    for source in dict.fromkeys(q.source for q in loads if q.source is not None):
+        rows = np.array([q.source == source for q in loads])
+        more = held[rows].mean(axis=1) - rubs[rows] - held[force == 0].mean()
+        u = each * math.sqrt(1 / rows.sum() + 1 / (force == 0).sum())
+        weight = float(np.abs(force[rows]).mean())
+        out[source.name] = float(more.mean()) / weight, u / weight
+    return out
 
 
 def inputs(axis: StageAxis, rig: RigFile, plan: Plan) -> dict[str, Estimate]:

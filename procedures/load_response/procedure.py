@@ -108,9 +108,8 @@ def measured(found: Evaluated) -> Iterator[Measured]:
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
-    known = [a.name for a in loaded(rig)]
-    if unknown := [name for name in plan.axes if name not in known]:
-        yield f"axes: found {', '.join(unknown)}; known loads pull both ways at {', '.join(known) or 'none'}"
+    if not chosen(rig, plan):
+        yield f"axes: found {plan.axes!r}; known loads pull both ways at {', '.join(a.name for a in loaded(rig))}"
         return
     envelope = Envelope(rig)
     for axis in chosen(rig, plan):
@@ -155,13 +154,20 @@ def requires(rig: RigFile) -> Requires:
 def untold(rig: RigFile) -> tuple[Quantity, ...]:
     """Of axes that the rig does not have."""
     units = {a.unit for a in loaded(rig)}
-    along = {"m/N", "m", "N"}
-    return tuple(q for q in MEASURES if q.unit != "1" and ("m" if q.unit in along else "rad") not in units)
+    return tuple(q for unit in ("m", "rad") if unit not in units for q in _of(unit))
+
+
+def _of(unit: str) -> tuple[Quantity, ...]:
+    """Quantities of axes in m or in rad alone."""
+    units = {"m": ("m/N", "m", "N"), "rad": ("rad/(N m)", "rad", "N m")}
+    return tuple(q for q in MEASURES if q.unit in units[unit])
 
 
 def left_out(plan: Plan) -> tuple[Quantity, ...]:
     """What the plan does not do."""
-    return (*(() if plan.static else STATIC), *(() if plan.disturbed else AFTER))
+    other = {"along": "rad", "around": "m"}.get(plan.axes)
+    none = _of(other) if other else ()
+    return tuple(dict.fromkeys((*none, *(() if plan.static else STATIC), *(() if plan.disturbed else AFTER))))
 
 
 def places(rig: RigFile) -> tuple[str, ...]:

@@ -27,7 +27,8 @@ class Put:
 
 def chosen(rig: RigFile, plan: Plan) -> tuple[StageAxis, ...]:
     """The axes of the plan, in the rig's order."""
-    return tuple(a for a in loaded(rig) if not plan.axes or a.name in plan.axes)
+    units = {"along": "m", "around": "rad"}
+    return tuple(a for a in loaded(rig) if units.get(plan.axes, a.unit) == a.unit)
 
 
 def masses(axis: StageAxis, plan: Plan) -> tuple[str, ...]:

@@ -148,7 +148,7 @@ def test_what_findings_need() -> None:
     assert loud(told(sound)) == set()
     assert "force-scale" in told(sound)
     assert loud(told([])) == {"passes-missing"}
-    assert loud(told([replace(sound[0], states=("FAULT",)), *sound[1:]])) == {"not-held"}
+    assert loud(told([replace(sound[0], states=("FAULT",)), *sound[1:]])) == {"axis-not-held"}
     assert loud(told([replace(sound[0], lost=5), *sound[1:]])) == {"missing-samples"}
     assert loud(told([replace(sound[0], uneven=0.2), *sound[1:]])) == {"rate-uneven"}
     assert loud(told([replace(sound[0], limited=0.5), *sound[1:]])) == {"not-served"}

@@ -117,7 +117,7 @@ def test_what_findings_need() -> None:
     sound = made()
     assert loud(told(sound)) == set()
     assert loud(told([])) == {"sines-missing"}
-    assert loud(told([replace(sound[0], states=("FAULT",)), *sound[1:]])) == {"not-held"}
+    assert loud(told([replace(sound[0], states=("FAULT",)), *sound[1:]])) == {"axis-not-held"}
     assert loud(told([replace(sound[0], lost=5), *sound[1:]])) == {"missing-samples"}
     assert loud(told([replace(sound[0], limited=0.5), *sound[1:]])) == {"sine-not-followed"}
     assert loud(told([replace(sound[0], went=0.1), *sound[1:]])) == {"sine-not-followed"}

@@ -26,6 +26,7 @@ from procedures.stages.known_loads import force, load_inputs, rubbing, sources
 
 PLAN = Plan()
 KP = {"x": 5400.0, "angle": 1.35}
+WAYS = {"x": "along", "angle": "around"}
 FRICTION = {"x": 1.4, "angle": 0.012}
 
 
@@ -80,7 +81,7 @@ def _rubs(load: Put, p: Mapping[str, float], rubs: float | None) -> float:
 
 
 def found(name: str, rests: list[Rest], plan: Plan = PLAN) -> estimates.Result:
-    only = plan.model_copy(update={"disturbed": False, "axes": (name,)})
+    only = plan.model_copy(update={"disturbed": False, "axes": WAYS[name]})
     return estimates.results(rests, [], rig(), only)
 
 
@@ -191,7 +192,7 @@ def test_what_contradicts(planted: dict[str, Any], code: str) -> None:
 
 
 def test_small_contradictions_pass() -> None:
-    for planted in ({"error": {"M3": 0.03}}, {"integrator": 0.97}, {"rubs": 0.03}, {"constant": 0.02}):
+    for planted in ({"error": {"M3": 0.02}}, {"integrator": 0.97}, {"rubs": 0.03}, {"constant": 0.02}):
         rests = made("x", **planted)  # type: ignore[arg-type]
         assert told(found("x", rests), rests) == {}
 
@@ -237,7 +238,7 @@ def changed(name: str = "x", way: int = 1) -> list[Change]:
 
 
 def test_a_peak_and_what_is_left() -> None:
-    plan = PLAN.model_copy(update={"static": False, "axes": ("x",)})
+    plan = PLAN.model_copy(update={"static": False, "axes": "along"})
     r = estimates.results([], changed(), rig(), plan)
     assert {where for _, where in r.estimates} == {"x, far", "x, far, off", "x, near", "x, near, off"}
     assert r.estimates["peak", "x, near"].value == pytest.approx(2.0415e-4 - 0.25e-6, rel=1e-4)
@@ -261,9 +262,12 @@ def test_a_record_that_ends_too_soon() -> None:
 
 def test_what_a_plan_may_ask() -> None:
     assert list(check(rig(), PLAN)) == []
-    assert "known loads pull both ways at x, angle" in next(iter(check(rig(), Plan(axes=("y",)))))
+    bare = rig().model_copy(update={"levers": {}})
+    assert "known loads pull both ways at x" in next(iter(check(bare, Plan(axes="around"))))
     assert "the rig file certifies M1" in next(iter(check(rig(), Plan(masses=("M9",)))))
     assert "ascending" in next(iter(check(rig(), Plan(masses=("M3", "M2")))))
     assert any("x_target" in text for text in check(rig(), Plan(lead_m=0.02)))
     assert {q.name for q in left_out(Plan(static=False))} >= {"compliance", "friction", "force_scale"}
+    left = {q.name for q in left_out(Plan(axes="along", disturbed=False))}
+    assert {q.name for q in procedure.measures} - left == {"compliance", "friction_band", "friction", "force_scale"}
     assert procedure.lacking(load_rig("lira"))

@@ -17,6 +17,8 @@ from bench.uncertainty import interval
 from procedures.load_response.procedure import procedure
 from reports.figures import draw as draw_figure
 
+WAYS = {"x": "along", "angle": "around"}
+
 
 def run(folder: Path, truth: Mapping[str, float] | None = None, seed: int = 1, **plan: Any) -> Simulated:
     return simulated_run("load-response", "rlsrm", seed, plan, folder / "recording.mcap", truth or {})
@@ -33,7 +35,7 @@ def strong(done: Simulated) -> set[str]:
 @pytest.mark.parametrize("name", ["x", "angle"])
 def test_the_whole_path(tmp_path: Path, name: str) -> None:
     """Every quantity within twice its U of what the drawn machine truly does; friction a little below the bearing's own."""
-    done = run(tmp_path, axes=(name,))
+    done = run(tmp_path, axes=WAYS[name])
     values, truth = told_by(done), truth_of_motion(done)
     assert strong(done) == set()
     assert set(values) == set(truth)
@@ -56,7 +58,8 @@ def test_the_whole_path(tmp_path: Path, name: str) -> None:
         ({"lever_exchanged": 1}, "angle", "load-on-wrong-side"),
         ({"brake_x": 3}, "x", "load-stuck"),
         ({"mass_error_M3": 0.15}, "x", "load-masses-differ"),
+        ({"hooks.far.pulley.friction": 0.15}, "x", "pulley-rubs"),
     ],
 )
 def test_planted(tmp_path: Path, truth: dict[str, float], name: str, code: str) -> None:
-    assert code in strong(run(tmp_path, truth, axes=(name,), disturbed=False))
+    assert code in strong(run(tmp_path, truth, axes=WAYS[name], disturbed=False))

@@ -15,7 +15,7 @@ WINDOWS = 4
 def margins(done: Simulated) -> Found:
     """At the places of the plan, of the same machine levitated anew."""
     from procedures.gate_margin.place import bound_of, grid, motion, planes
-    from sim_backend.motion import GateAsked
+    from sim_backend.mission_motion import GateAsked
 
     rig, plan, of = done.recording.rig, done.recording.plan, done.drawn.machine.motions.gates
     if of is None:

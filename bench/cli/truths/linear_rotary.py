@@ -34,7 +34,7 @@ def mission(done: Simulated) -> Found:
     from procedures.mission.estimates import gate_of, place_of, rest_of
     from procedures.mission.procedure import TURN_RATE, TURN_RISE
     from procedures.mission.steps import LIFT, motion
-    from sim_backend.motion import MissionAsked
+    from sim_backend.mission_motion import MissionAsked
 
     plan: Any = done.recording.plan
     rig, of = done.recording.rig, done.drawn.machine.motions.mission

@@ -11,14 +11,14 @@ if TYPE_CHECKING:
     from bench.rigfile import RigFile
     from bench.rigfile.stage import StageAxis
     from procedures.load_response.plan import Plan
-    from sim_backend.motion_loads import LoadedAxis
+    from sim_backend.loads_motion import LoadedAxis
 
 
 def answers(done: Simulated) -> Found:
     """Of the plan's axes and loads, of the same machine taken through it anew."""
     from bench.rigfile.stage import axes_of
     from procedures.load_response.sequence import INTEGRATORS, chosen
-    from sim_backend.motion_loads import LoadsAsked
+    from sim_backend.loads_motion import LoadsAsked
 
     rig, plan, of = done.recording.rig, done.recording.plan, done.drawn.machine.motions.loads
     if of is None:
@@ -35,7 +35,7 @@ def answers(done: Simulated) -> Found:
 
 def _axis(rig: RigFile, plan: Plan, axis: StageAxis) -> LoadedAxis:
     from procedures.load_response.sequence import Put, changes, count, lead, order, slow
-    from sim_backend.motion_loads import LoadedAxis
+    from sim_backend.loads_motion import LoadedAxis
 
     def told(load: Put) -> tuple[str, str, int]:
         return ("", "", 0) if load.source is None else (load.source.name, load.label, load.source.sign)

@@ -19,7 +19,7 @@ from sim_backend.machine import Truth
 from sim_backend.machines.lira.params import PlantParams
 from sim_backend.machines.lira.plant import TRACE
 from sim_backend.machines.lira.truth_loops import RATE, Flying
-from sim_backend.motion import GateAsked
+from sim_backend.mission_motion import GateAsked
 
 RADIAL: Final = ("x1", "x2", "y1", "y2")
 TRUE: Final = [TRACE.index(f"true_{name}") for name in RADIAL]

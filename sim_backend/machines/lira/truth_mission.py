@@ -15,7 +15,7 @@ from sim_backend.machine import Truth
 from sim_backend.machines.lira.params import PlantParams
 from sim_backend.machines.lira.plant import STATES, TICKS_S, TRACE, Plant
 from sim_backend.machines.lira.settings import BY_NAME
-from sim_backend.motion import MissionAsked
+from sim_backend.mission_motion import MissionAsked
 
 RADIAL: Final = ("x1", "x2", "y1", "y2")
 KEPT: Final = (*RADIAL, "z", "angle", "true_z", "true_angle", "mode")

@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from bench.rigfile import RigFile
 from bench.rigfile.toleranced import Toleranced
+from sim_backend import instrument
 from sim_backend.machine import Array, Machine, Numbers, Truth
 from sim_backend.machines.rlsrm import quantities as of
 from sim_backend.machines.rlsrm.defects import DEFECTS, NAMES
@@ -16,7 +17,10 @@ from sim_backend.machines.rlsrm.params import DEG, ControlParams, Each, Map, Pla
 from sim_backend.machines.rlsrm.plant import LOOP_TICKS, TICKS_S
 from sim_backend.machines.rlsrm.served import READINGS
 from sim_backend.machines.rlsrm.states import states
+from sim_backend.machines.rlsrm.truth_decoupling import decoupling
+from sim_backend.machines.rlsrm.truth_following import following
 from sim_backend.machines.rlsrm.truth_load import loads
+from sim_backend.machines.rlsrm.truth_map import of_map, of_zeros
 from sim_backend.motion import Motions
 
 EACH: Final = {"phase_gain": NAMES, "resistance_spread": NAMES, "stator_zero": ("1", "2")}
@@ -38,7 +42,7 @@ def stated(rig: RigFile) -> dict[str, Toleranced]:
     out |= {"site.gravity": rig.site.gravity, "site.air_density": rig.site.air_density}
     for name, sensor in rig.sensors.items():
         out |= {f"{name}.gain": sensor.gain, f"{name}.offset": sensor.offset}
-    out |= dict(_inline(rig))
+    out |= dict(_inline(rig)) | instrument.stated(rig)
     for name, t in rig.simulation.items():
         if isinstance(t, Toleranced):
             out |= {f"{name}_{end}": t for end in EACH[name]} if name in EACH else {name: t}
@@ -183,5 +187,5 @@ RLSRM = Machine(
     radial=slice(0, 0), integral_gains=frozenset(("ki_x", "ki_angle")), turns=False, channels=CHANNELS, places=places,
     spoil=spoil, supply_V=90.0, windings={}, copper_W=copper_W, operator=operator, traced=lambda _: READINGS, daily=DAILY,
     controls=SETTABLE, levitates=False, tick_s=1 / TICKS_S, period_s=LOOP_TICKS / TICKS_S, states=states,
-    motions=Motions(loads=loads),
+    motions=Motions(loads=loads, inductances=of_map, stators=of_zeros, following=following, decoupling=decoupling),
 )  # fmt: skip

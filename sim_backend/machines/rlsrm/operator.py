@@ -7,8 +7,10 @@ import math
 from typing import Final
 
 from bench.rigfile import RigFile
+from sim_backend.instrument import Instruments
 from sim_backend.machine import Truth, weight_in_air
 from sim_backend.machines.rlsrm.device import StagePlant
+from sim_backend.machines.rlsrm.plant import AXES, TICKS_S
 
 HAND_OVER_S: Final = 0.3  # how long it takes to let a mass go
 WORK_S: Final = 1.0
@@ -30,14 +32,18 @@ class Attendant:
         self._plant, self._truth = plant, truth
         self._ends = {name: 1 if hook.along == "far" else -1 for name, hook in rig.hooks.items()}
         self._hung: dict[str, str] = {}  # labels by hook or side
+        places = {name: lambda k=k: float(plant.core.place[k]) for k, name in enumerate(AXES)}
+        self._instruments = Instruments(rig, truth, places, lambda: plant.core.tick / TICKS_S)
 
     def request(self, line: str) -> str:
         """One line: `hang HOOK M1`, `hang HOOK -`, `lever left M1`, `lever left -`, `mount ring`, `mount bar`, `mount lock`
-        (both axes), `mount lock-along`, `mount lock-around`, `mount -` (all of these off), `ask TEXT`. Answers `ok SECONDS`
-        (when it will be done), `yes` or `error TEXT`."""
+        (both axes), `mount lock-along`, `mount lock-around`, `mount -` (all of these off), `read AXIS`, `ask TEXT`. Answers
+        `ok SECONDS` (when it will be done), `ok SECONDS NUMBER UNIT`, `yes` or `error TEXT`."""
         match line.split():
             case ["ask", *_]:
                 return "yes"
+            case ["read", axis]:
+                return self._instruments.request(axis)
             case ["hang", hook, label] if hook in self._ends and self._knows(label):
                 return self._hang(hook, label)
             case ["lever", "left" | "right" as side, label] if self._knows(label):

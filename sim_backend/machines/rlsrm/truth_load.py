@@ -14,12 +14,13 @@ import numpy as np
 
 from bench.rigfile import RigFile
 from sim_backend.core.plant import Array
+from sim_backend.loads_motion import LoadedAxis, LoadsAsked
 from sim_backend.machine import Truth
 from sim_backend.machines.rlsrm.device import StagePlant, control_of
 from sim_backend.machines.rlsrm.operator import Attendant
 from sim_backend.machines.rlsrm.params import PlantParams
-from sim_backend.machines.rlsrm.plant import AXES, TRACE, Plant
-from sim_backend.motion_loads import LoadedAxis, LoadsAsked
+from sim_backend.machines.rlsrm.plant import AXES, TRACE
+from sim_backend.machines.rlsrm.served import Served
 
 AT_REST, CHANGED = 2, 4  # times the plan's set points within a count, between which they lie
 GOLDEN: Final = 0.6180339887
@@ -32,7 +33,7 @@ ANSWERS_S: Final = 0.15  # after a load begins to be let go, until a reading sho
 class Stand:
     """A motor that is held, its attendant, and where its set points are."""
 
-    core: Plant
+    core: Served
     attendant: Attendant
     params: PlantParams
     at: dict[str, float]
@@ -72,7 +73,7 @@ def loads(rig: RigFile, drawn: Truth, asked: LoadsAsked) -> dict[tuple[str, str]
 def _stand(rig: RigFile, drawn: Truth, asked: LoadsAsked, settings: Mapping[str, float]) -> Stand:
     told = {name: value * drawn.defects.get(f"factor_{name}", 1.0) for name, value in settings.items()}
     plant = StagePlant(drawn.plant, drawn.seed)
-    plant.core = core = Plant(drawn.plant.plant, control_of(told))
+    plant.core = core = Served(drawn.plant.plant, control_of(told))
     core.switch(on=True, x=True, angle=True)
     core.run(asked.settle_s, every=0)
     return Stand(core, Attendant(rig, plant, drawn), drawn.plant.plant, dict.fromkeys(AXES, 0.0))

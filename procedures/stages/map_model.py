@@ -1,0 +1,36 @@
+"""From the terms of a map of inductances to the parameters of the controller that has one, by meaning."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from bench.rigfile import RigFile
+
+WHOLE = {"map_slope": "slope", "map_unaligned": "unaligned", "map_c2": "c2", "map_c3": "c3", "map_length": "length",
+         "map_overlap": "overlap", "map_fringe": "fringe", "map_leakage": "leakage", "map_saturation": "saturation",
+         "map_centre": "centre"}  # fmt: skip
+
+
+def names(stators: Sequence[str], phases: Sequence[str]) -> dict[str, str]:
+    """By meaning, the quantity of `inductance-map` that it is, with its place."""
+    zeros = {f"map_zero_{k + 1}": f"zero@{stator}" for k, stator in enumerate(stators)}
+    gains = {f"map_gain_{k + 1}": f"gain@{phase}" for k, phase in enumerate(phases)}
+    return {**WHOLE, **zeros, **gains}
+
+
+def parameters(
+    rig: RigFile, values: Mapping[str, float], stators: Sequence[str], phases: Sequence[str]
+) -> dict[str, float]:
+    """The controller's parameters, SI, of what was measured (`name` or `name@place`)."""
+    model = rig.capabilities.model
+    return {
+        model[meaning]: values[name]
+        for meaning, name in names(stators, phases).items()
+        if meaning in model and name in values
+    }
+
+
+def present(rig: RigFile, meaning: str, otherwise: float) -> float:
+    """What the controller's map has by default."""
+    known = rig.parameters.get(rig.capabilities.model.get(meaning, ""))
+    return otherwise if known is None else known.default

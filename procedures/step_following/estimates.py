@@ -1,0 +1,101 @@
+"""Numbers with influences: by mode, axis and way over the repeats that count."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bench.rigfile.stage import StageAxis
+from bench.uncertainty import Estimate, Influence
+from procedures.stages.counts import BOUND, averaged, edges, erred, half_count, pitch_of, rested, rounded, stretched
+from procedures.stages.tracks import Mode, named, where_of, without
+from procedures.step_following.fit import Stepped, began, stepped
+from procedures.step_following.plan import Plan
+from procedures.step_following.steps import UP, Move, places, step_of
+
+EVEN = 0.25  # of half a count: an eighth of a whole one
+ERROR, TRUE, OVER, TIME = "static_error", "true_static_error", "overshoot", "settling_time"
+
+
+@dataclass(frozen=True)
+class Group:
+    """Moves of one axis one way in one mode, with what each of them was; `where` is what its results are called."""
+
+    mode: Mode
+    axis: StageAxis
+    way: str
+    where: str
+    moves: Sequence[Move]
+    found: Sequence[Stepped]
+
+
+@dataclass(frozen=True)
+class Results:
+    """Groups in time order, estimates by quantity and where."""
+
+    groups: Sequence[Group]
+    estimates: Mapping[tuple[str, str], Estimate]
+
+
+def grouped(moves: Iterable[Move], plan: Plan) -> list[Group]:
+    """Moves that count, by mode, axis and way."""
+    some: dict[tuple[str, str, str], list[Move]] = {}
+    for m in moves:
+        if m.repeat >= 0:
+            some.setdefault((m.mode.name, m.track.axis.name, m.way), []).append(m)
+    return [_group(g, plan) for g in some.values()]
+
+
+def _group(moves: Sequence[Move], plan: Plan) -> Group:
+    mode, axis, way = moves[0].mode, moves[0].track.axis, moves[0].way
+    where = where_of(mode, axis, way, without(plan.integrators))
+    return Group(mode, axis, way, where, moves, [one(m, plan) for m in moves])
+
+
+def one(move: Move, plan: Plan) -> Stepped:
+    """What one move was."""
+    track, axis = move.track, move.track.axis
+    step, target = step_of(axis, plan, move.way), places(axis, plan)[move.way == UP]
+    rest = max(round(plan.rest_s / float(np.median(np.diff(track.t)))), 2)
+    begun = began(track.reference) or 0
+    return stepped(track.t, track.read, target, step, begun, rest, plan.band, pitch_of(axis))
+
+
+def results(groups: Sequence[Group], plan: Plan) -> Results:
+    """All estimates."""
+    out: dict[tuple[str, str], Estimate] = {}
+    for g in groups:
+        out |= _of_group(g, plan)
+    return Results(groups, out)
+
+
+def _of_group(g: Group, plan: Plan) -> Mapping[tuple[str, str], Estimate]:
+    axis, where, way = g.axis, g.where, (1.0 if g.way == UP else -1.0)
+    size = abs(step_of(axis, plan, g.way))
+    target = places(axis, plan)[g.way == UP]
+    errors, overs = [f.error for f in g.found], [f.overshoot for f in g.found]
+    half, share = half_count(axis), averaged(errors)
+    beyond = edges(axis) + erred(axis, f"{target:g}") + stretched(axis, target)
+    over = rounded(f"{OVER}/{where}", axis, half * averaged(overs))
+    out = {
+        (named(ERROR, axis), where): rounded(f"{ERROR}/{where}", axis, half * share) + float(np.mean(errors)),
+        (named(TRUE, axis), where): rested(f"{ERROR}/{where}", axis, share) - way * beyond + float(np.mean(errors)),
+        (OVER, where): Estimate(float(np.mean(overs)), "1", {i: c / size for i, c in over.sensitivities.items()}),
+    }
+    if all(f.settled is not None for f in g.found):
+        out[TIME, where] = _time(g)
+    return out
+
+
+def _time(g: Group) -> Estimate:
+    """Settling: where the rate changes by no more than itself from edge to edge of a count, the place is up to an eighth of
+    that time off its straight line; the edges are passed between two samples."""
+    times = [f.settled for f in g.found if f.settled is not None]
+    slope, share = float(np.mean([f.slope for f in g.found])), averaged(times)
+    off = rounded(f"{TIME}/{g.where}", g.axis, EVEN * half_count(g.axis) * share)
+    period = float(np.median(np.diff(g.moves[0].track.t)))
+    told = Influence(f"sampling/{g.where}", "between two samples", share * period / 2 / BOUND, "s", "B", "normal")
+    turned = Estimate(float(np.mean(times)), "s", {i: c * slope for i, c in off.sensitivities.items()})
+    return turned + Estimate.of(0.0, told)
