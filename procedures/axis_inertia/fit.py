@@ -27,22 +27,33 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 Take = npt.NDArray[np.intp]
-HARMONICS = 20
+MOST, FEWEST = 40, 5  # harmonics
+ROUNDED = 1e-3  # of the square of the acceleration, that rounding of the reading may make
 SLOW = 0.3  # of the greatest speed: below it friction may be that of sticking
 DELAYS = (0.0, 2e-3)  # s, at which coefficients are worked out; between them they go straight
 
 
-def operators(t: Array, reading: Array, hz: float) -> tuple[float, Array, Array]:
-    """First amplitude of a reading (n,), and what a force is multiplied by to be inertia and Coulomb friction, (2, n) each, at
-    both DELAYS."""
-    turn = 2 * math.pi * hz * np.arange(1, HARMONICS + 1)
+def harmonics_of(samples: int, amplitude: float, count: float) -> int:
+    """How many harmonics of a reading are fitted. Rounded to counts p it has p^2/12 of noise, of which each harmonic takes 2/n;
+    up to H these are accelerations of the square p^2 H^5/(30 n A^2) of that of a sine of amplitude A."""
+    if count == 0:
+        return MOST
+    most = (30 * ROUNDED * samples * (amplitude / count) ** 2) ** 0.2
+    return int(min(max(most, FEWEST), MOST))
+
+
+def operators(t: Array, reading: Array, hz: float, count: float = 0.0) -> tuple[float, Array, Array]:
+    """First amplitude of a reading (n,), in counts of that size, and what a force is multiplied by to be inertia and Coulomb
+    friction, (2, n) each, at both DELAYS."""
+    many = harmonics_of(len(t), float(np.ptp(reading)) / 2, count)
+    turn = 2 * math.pi * hz * np.arange(1, many + 1)
 
     def harmonics(at: Array) -> Array:
         return np.concatenate([np.exp(1j * np.outer(turn, at)).real, np.exp(1j * np.outer(turn, at)).imag])
 
     design = np.concatenate([np.ones((1, len(t))), harmonics(t)]).T
     found = np.linalg.lstsq(design, reading, rcond=None)[0][1:]
-    half = found[:HARMONICS] - 1j * found[HARMONICS:]
+    half = found[:many] - 1j * found[many:]
     inertia, rubs = [], []
     for delay in DELAYS:
         wave = np.exp(1j * np.outer(turn, t + delay))

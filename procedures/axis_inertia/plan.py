@@ -27,10 +27,8 @@ class Plan(BenchPlan):
     saturation_share: float = Field(
         0.05, ge=0
     )  # tolerance of the current at which the map has iron saturate, half width
-    delay_s: float = Field(
-        1e-3, ge=0
-    )  # of force behind what is asked for: a period of the loops, and the currents' rise
-    delay_half_s: float = Field(7e-4, ge=0)  # its tolerance, half width
+    delay_s: float = Field(7e-4, ge=0)  # of force behind what is asked for: half a period of the loops, and 0.2 ms
+    delay_half_s: float = Field(4e-4, ge=0)  # its tolerance, half width
     max_apart: float = Field(0.05, gt=0)  # by which tones may differ, as a share
     max_rubbed: float = Field(0.2, gt=0)  # by which friction may differ with the part, as a share
     max_u: float = Field(0.03, gt=0)  # standard uncertainty, as a share

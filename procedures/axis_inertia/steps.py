@@ -74,7 +74,7 @@ def _sine(recording: Recording[Plan], step: Step) -> Sine:
     known = rig.choices(STATE)
     inside = {name: values[within] for name, values in data.items()}
     force = inside[axis.given or axis.asked]
-    went, per, rubs = fit.operators(t[within], inside[axis.channel], hz)
+    went, per, rubs = fit.operators(t[within], inside[axis.channel], hz, axis.pitch.value if axis.pitch else 0.0)
     most = rig.parameters[axis.limit].default if axis.limit else math.inf
     asked = inside[axis.asked or axis.given]
     limited = (np.abs(asked) >= AT_LIMIT * most) | (np.abs(asked - force) > APART * most)

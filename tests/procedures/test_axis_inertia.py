@@ -58,6 +58,13 @@ def test_friction_is_no_part_of_inertia() -> None:
     )  # by its first
 
 
+def test_how_many_harmonics_rounding_leaves() -> None:
+    """By hand: 0.8 rad by 2.51 mrad, 2667 samples: (30 * 1e-3 * 2667 * 318.3^2)^(1/5) = 24.08; 7 mm by 1 um would have 83."""
+    assert fit.harmonics_of(2667, 0.8, 2.513e-3) == 24
+    assert fit.harmonics_of(2778, 7e-3, 1e-6) == fit.MOST
+    assert fit.harmonics_of(2778, 1e-3, 1e-3) == fit.FEWEST
+
+
 def test_a_force_that_comes_late() -> None:
     """By hand: two milliseconds later is one that was given two milliseconds before."""
     t, x, _ = motion(3.35, 1.5, 4.0, 2.0, 6e-3)
