@@ -35,15 +35,14 @@ def _traces(r: Result, plan: Plan) -> Figure:
     (big, unit), (fine, small) = _told(r.pair.moved, small=False), _told(r.pair.held, small=True)
     low, high = r.place.min(axis=0), r.place.max(axis=0)
     held = (
-        Series("least and greatest of the periods", t[::every], fine * _extremes(low, every, np.minimum), "faint"),
+        Series("", t[::every], fine * _extremes(low, every, np.minimum), "faint"),
         Series("", t[::every], fine * _extremes(high, every, np.maximum), "faint"),
-        Series("mean of the periods", t[::every], fine * r.place.mean(axis=0)[::every]),
+        Series("", t[::every], fine * r.place.mean(axis=0)[::every]),
     )
-    below = Figure(
-        "", "", "", "time / s", f"{r.pair.held.name} - set point / {small}", held, lines=(("set point", 0.0),)
-    )
+    below = Figure("", "", "", "time / s", f"{r.pair.held.name} - set point / {small}", held, lines=(("", 0.0),))
     caption = (f"{r.pair.moved.name} follows its sine, {r.pair.held.name} is held: readings over a period, {len(r.place)} "
-               f"periods laid on each other. The largest excursion is {fine * r.excursion:.3g} {small}.")  # fmt: skip
+               f"periods laid on each other; below their mean, in grey their least and greatest, and the set point. The "
+               f"largest excursion is {fine * r.excursion:.3g} {small}.")  # fmt: skip
     moved = Series(r.pair.moved.name, t[::every], big * r.moved.mean(axis=0)[::every])
     key = f"traces-{r.pair.held.name}-{r.pair.moved.name}"
     return Figure(key, f"Both axes over a period: {r.pair.where}", caption, "time / s", f"{r.pair.moved.name} / {unit}",

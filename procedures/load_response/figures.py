@@ -41,10 +41,10 @@ def _loop(s: Static, r: Result) -> Figure:
     ends = np.array([s.force.min(), s.force.max()])
     line = (s.deviation.zero + s.deviation.value * ends) * scale
     e = r.estimates.get((named(COMPLIANCE, s.axis.unit == "rad"), s.axis.name))
-    label = "mean of both" if e is None else f"mean of both: {e.value * scale:.4g} {unit}/({s.axis.force})"
+    label = "mean of both" if e is None else f"mean of both: {e.value * scale:.4g} {unit}/{_below(s.axis.force)}"
     caption = (f"Where {s.axis.name} comes to rest under each load beside its set point, moved slowly upwards and downwards, "
                f"at {k} set points spread over one count. Friction holds it anywhere between.")  # fmt: skip
-    return Figure(f"loads-{s.axis.name}", f"Under loads, {s.axis.name}", caption, f"load / ({s.axis.force})",
+    return Figure(f"loads-{s.axis.name}", f"Under loads, {s.axis.name}", caption, f"load / {s.axis.force}",
                   f"deviation of {s.axis.name} / {unit}",
                   (Series("upwards", x, up, "points"), Series("downwards", x, down, "points"),
                    Series(label, ends, line)))  # fmt: skip
@@ -77,11 +77,16 @@ def _row(s: Static, r: Result) -> tuple[str, ...]:
     stiff = 1 / per
 
     def text(value: float, low: float, high: float) -> str:
-        return f"{value:.4g} ± {(high - low) / 2:.1g}"
+        return f"{value:.4g} ± {float(f'{(high - low) / 2:.2g}'):g}"
 
     cells = []
     for e, f in ((per, factor), (stiff, 1.0), (band, factor), (held, 1.0), (scale, 1.0)):
         at = interval(e)
         cells.append(text(e.value * f, at.low * f, at.high * f))
-    names = (f"{unit}/({force})", f"{force}/{s.axis.unit}", unit, force, "")
+    names = (f"{unit}/{_below(force)}", f"{force}/{s.axis.unit}", unit, force, "")
     return (s.axis.name, *(f"{cell} {name}".strip() for cell, name in zip(cells, names, strict=True)))
+
+
+def _below(unit: str) -> str:
+    """A unit below a stroke of division."""
+    return f"({unit})" if " " in unit else unit
