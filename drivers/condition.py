@@ -9,6 +9,7 @@ from bench.procedure.roles import RigState
 from bench.rigfile import RigFile
 from bench.rigfile.binding import HELD, UNKNOWN
 from bench.rigfile.roles import SPEED, told_in
+from bench.rigfile.stage import is_stage
 from drivers import advice
 
 SET_DOWN = ("LAND", "LET_GO", "DISABLE", "MAKE_SAFE")
@@ -25,7 +26,7 @@ class Condition:
     """State and fault by the names of the rig file, out of what `telemetry` decoded last."""
 
     def __init__(self, rig: RigFile, telemetry: TelemetryDecoder) -> None:
-        self._binding, self._telemetry = rig.binding, telemetry
+        self._binding, self._telemetry, self._axes = rig.binding, telemetry, is_stage(rig)
         self._states, self._faults = rig.choices("state"), rig.choices("fault")
         self._speed = told_in(rig, SPEED)
         self._reboots = 0
@@ -119,7 +120,9 @@ class Condition:
         """What is wrong with a state of rest that nobody asked for."""
         speed = self._telemetry.latest.get(self._speed)
         turning = "" if speed is None else f"; its speed channel says {speed:.1f} rad/s"
-        return f"the controller says {self.described(now_ns)}, though it held the rotor and nobody asked it to land{turning}"
+        told, asked = ("axes", "let them go") if self._axes else ("rotor", "land")
+        said = f"the controller says {self.described(now_ns)}, though it held the {told}"
+        return f"{said} and nobody asked it to {asked}{turning}"
 
     def _rests_unasked(self) -> bool:
         """Whether it has for longer than a wrong sample takes."""

@@ -8,7 +8,7 @@ import pytest
 from hostile_controller import Bench, Telemetry, unchanged
 
 from bench.cli.stage_safety import END_S
-from bench.errors import InterlockError, StateNotReached
+from bench.errors import InterlockError, StateContradicts, StateNotReached
 from bench.procedure.roles import RigState
 from bench.rigfile import RigFile, load_rig
 from bench.rigfile.stage import axes_of
@@ -141,3 +141,11 @@ def test_a_turn_is_not_cut_short_by_a_set_point_that_has_yet_to_begin() -> None:
     bench = Bench(RIG)
     stage(bench).move({"angle": 2 * math.pi})
     assert bench.controller.reading("angle") == pytest.approx(2 * math.pi, abs=0.02)
+
+
+def test_axes_that_were_let_go_unasked_end_the_run() -> None:
+    bench = Bench(RIG)
+    code = next(c for c, name in RIG.choices("state").items() if name == "READY")
+    bench.link.change = Telemetry(RIG, {"state": code}, frozen=(), stuck=False)
+    with pytest.raises(StateContradicts, match="though it held the axes and nobody asked it to let them go"):
+        bench.controller.clock.sleep(0.5)
