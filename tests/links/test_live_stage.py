@@ -46,3 +46,27 @@ def test_a_machine_whose_bench_is_killed_stops_by_itself_and_says_so(tmp_path: P
         rig.child.wait_for("-> FAULT", seen)
         told = changes([line for line in rig.child.err[seen:] if " -> " in line])
     assert told[-2:] == ["MOVING -> STOPPING, fault HEARTBEAT_LOST", "STOPPING -> FAULT, fault HEARTBEAT_LOST"]
+
+
+SHORT = {
+    "step-following": ('moved="stroke"', "together=false", "repeats=2", "lead=0", "dwell_s=2.0"),
+    "sine-following": ('moved="angle"', "together=false", "periods=1", "period_s=4.0"),
+}
+
+
+@pytest.mark.long
+@pytest.mark.timeout(300)
+@pytest.mark.parametrize("procedure", SHORT)
+def test_a_procedure_of_stages_runs_over_packets(tmp_path: Path, procedure: str) -> None:
+    """A short plan: what was recorded is whole, and within the limits."""
+    plan = [word for setting in SHORT[procedure] for word in ("--plan", setting)]
+    with processes.served(tmp_path, "--seed", "1", rig=RIG, ports=PORTS) as rig:
+        arguments = processes.live(rig, "serial:socket", procedure, "--no-report", *plan, name=RIG)
+        with processes.bench(tmp_path, *arguments) as child:
+            status = child.end(240.0)
+            record = processes.record_in(tmp_path, child)
+            told = changes(rig.state_lines())
+    serious = [f["code"] for f in record["findings"] if f["effect"] != "note" and f["code"] not in processes.EXPECTED]
+    assert (status, record["outcome"], serious) == (0, "PASS", []), record["findings"]
+    assert record["link"]["gaps"] == 0
+    assert told[-1].endswith("-> OFF")
