@@ -50,7 +50,7 @@ def test_a_machine_whose_bench_is_killed_stops_by_itself_and_says_so(tmp_path: P
 
 SHORT = {
     "step-following": ('moved="stroke"', "together=false", "repeats=2", "lead=0", "dwell_s=2.0"),
-    "sine-following": ('moved="angle"', "together=false", "periods=1", "period_s=4.0"),
+    "sine-following": ('moved="angle"', "together=false", "periods=1"),
 }
 
 
@@ -62,7 +62,7 @@ def test_a_procedure_of_stages_runs_over_packets(tmp_path: Path, procedure: str)
     plan = [word for setting in SHORT[procedure] for word in ("--plan", setting)]
     with processes.served(tmp_path, "--seed", "1", rig=RIG, ports=PORTS) as rig:
         arguments = processes.live(rig, "serial:socket", procedure, "--no-report", *plan, name=RIG)
-        with processes.bench(tmp_path, *arguments) as child:
+        with processes.bench(tmp_path, *arguments, catalogue="bench.cli") as child:
             status = child.end(240.0)
             record = processes.record_in(tmp_path, child)
             told = changes(rig.state_lines())
