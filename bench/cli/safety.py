@@ -14,10 +14,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from bench import runlog
+from bench.cli import forward
+from bench.cli.forward import END_S, GIVE_UP_S, LOOK_S, SAFE
 from bench.cli.patience import Patience
 from bench.cli.witness import RESTING, Witness
-from bench.errors import BenchError, InterlockError, LinkError, Refused
+from bench.errors import BenchError, InterlockError, LinkError
 from bench.findings import Finding
 from bench.procedure.roles import Drive
 from bench.rigfile.binding import UNKNOWN, UNSEEN
@@ -28,11 +29,7 @@ if TYPE_CHECKING:
     from drivers.controller import Controller
 
 logger = logging.getLogger("bench.make-safe")
-SAFE = ("OFF", "FAULT")
 UNTOLD = (UNSEEN, UNKNOWN)
-GIVE_UP_S = 10.0  # without progress, until the next means
-END_S = 3 * GIVE_UP_S  # and until nothing more is waited for
-LOOK_S, ASK_S = 0.05, 0.5
 LOOKS = 3  # at a state of rest that something contradicts, before that is believed
 LANDED_S = 3.0  # beyond its own time, for a landing to show
 
@@ -90,7 +87,7 @@ class _Way:
         mode = self._settled()
         if c.sight.mode in RESTING and mode == UNKNOWN:
             # It says that it rests, and something says that it does not: a motor that obeys brakes the rotor first.
-            if c.sight.mode == "FAULT" or not (self.patience.fast and self._obeyed("STOP")):
+            if c.sight.mode == "FAULT" or not (self.patience.fast and forward.obeyed(c, self.patience, "STOP")):
                 self._own_way()
         elif mode in (*UNTOLD, "LIFTING"):
             self._own_way()
@@ -188,42 +185,12 @@ class _Way:
             self.heard = False
             raise
 
-    def _obeyed(self, name: str) -> bool:
-        """Send a command to a controller that may be in no state for it; whether it was accepted."""
-        try:
-            self._send(name)
-        except (Refused, LinkError) as error:
-            logger.warning("make safe: %s", error)
-            return False
-        return True
-
     def _send(self, name: str, slow: Callable[[], bool] | None = None) -> None:
-        """A command, which is repeated while `slow`. One that was answered and accepted is progress, however long that took."""
-        sight = self.controller.sight
-        before = sight.answered_ns
-        self.controller.command(name, slow)
-        if sight.answered_ns != before:
-            self.patience.went_on()
+        forward.send(self.controller, self.patience, name, slow)
 
     def _until(self, done: Callable[[], bool], limit_s: float, what: str) -> None:
-        """Wait, and say for what, while something goes forward.
-
-        Raises:
-            LinkError: nothing has for so long, or the link is dead.
-        """
-        c, p = self.controller, self.patience
-        while True:
-            p.look()
-            self.seen.look(p)
-            if done():
-                return
-            if (still := p.still_s) >= limit_s:
-                raise LinkError(f"waited {still:.0f} s for {what}; nothing went forward")
-            if (line := p.line(what, limit_s)) is not None:
-                runlog.show(logger, line)
-            if not c.sight.told or self.asked or self.mode == UNKNOWN:
-                p.every(ASK_S, c.ask_state)
-            c.clock.sleep(LOOK_S)
+        forward.until(self.controller, self.patience, self.seen, done, limit_s, what,
+                      lambda: self.asked or self.mode == UNKNOWN)  # fmt: skip
 
 
 def may_touch(controller: Controller, drive: Drive | None) -> Callable[[], None]:

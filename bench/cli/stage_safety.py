@@ -8,15 +8,15 @@ forward (`bench.cli.patience`).
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from bench import runlog
+from bench.cli import forward
+from bench.cli.forward import END_S, GIVE_UP_S, SAFE
 from bench.cli.patience import Patience
 from bench.cli.witness import RESTING, Witness
-from bench.errors import LinkError, Refused
+from bench.errors import LinkError
 from bench.findings import Finding
 from bench.rigfile.binding import UNKNOWN
 from bench.run.job import WatchedClock
@@ -24,12 +24,6 @@ from bench.run.supervisor import SafeStep
 
 if TYPE_CHECKING:
     from drivers.controller import Controller
-
-logger = logging.getLogger("bench.make-safe")
-SAFE = ("OFF", "FAULT")
-GIVE_UP_S = 10.0  # without progress, until the next means
-END_S = 3 * GIVE_UP_S
-LOOK_S = 0.05
 
 
 def making_stage_safe(
@@ -78,7 +72,7 @@ class _Way:
         self.seen.begin(self.patience)
         c.clock.sleep(0.02)  # a command may have been sent whose effect nobody has seen yet
         if self._mode not in SAFE:
-            self._send("MAKE_SAFE")
+            forward.send(c, self.patience, "MAKE_SAFE")
 
     def rest(self) -> None:
         """Until it rests."""
@@ -89,8 +83,8 @@ class _Way:
         if self._mode in SAFE or (self._rests and self._mode == "HOLDING"):
             return
         if self._mode not in RESTING:
-            self._obeyed("LET_GO")
-        self._send("DISABLE")
+            forward.obeyed(self.controller, self.patience, "LET_GO")
+        forward.send(self.controller, self.patience, "DISABLE")
         self._until(lambda: self._mode in SAFE, GIVE_UP_S, "amplifiers off")
 
     def watchdog(self) -> None:
@@ -106,37 +100,5 @@ class _Way:
                 "its controller stops it by itself; look at it before going near"
             ) from error
 
-    def _obeyed(self, name: str) -> bool:
-        try:
-            self._send(name)
-        except (Refused, LinkError) as error:
-            logger.warning("make safe: %s", error)
-            return False
-        return True
-
-    def _send(self, name: str) -> None:
-        sight = self.controller.sight
-        before = sight.answered_ns
-        self.controller.command(name)
-        if sight.answered_ns != before:
-            self.patience.went_on()
-
     def _until(self, done: Callable[[], bool], limit_s: float, what: str) -> None:
-        """Wait, and say for what, while something goes forward.
-
-        Raises:
-            LinkError: nothing has for so long, or the link is dead.
-        """
-        c, p = self.controller, self.patience
-        while True:
-            p.look()
-            self.seen.look(p)
-            if done():
-                return
-            if (still := p.still_s) >= limit_s:
-                raise LinkError(f"waited {still:.0f} s for {what}; nothing went forward")
-            if (line := p.line(what, limit_s)) is not None:
-                runlog.show(logger, line)
-            if not c.sight.told:
-                p.every(2 * LOOK_S, c.ask_state)
-            c.clock.sleep(LOOK_S)
+        forward.until(self.controller, self.patience, self.seen, done, limit_s, what)

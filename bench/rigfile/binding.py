@@ -32,7 +32,8 @@ LEVITATION_MODES: tuple[Mode, ...] = (
 STAGE_MODES: tuple[Mode, ...] = ("OFF", "READY", "HOMING", "HOLDING", "MOVING", "STOPPING", "FAULT")
 """Of a machine that does not levitate: its axes are held, or move."""
 MODES: tuple[Mode, ...] = tuple(dict.fromkeys((*LEVITATION_MODES, *STAGE_MODES)))
-HELD: tuple[Mode, ...] = ("LEVITATED", "SPINNING", "HOLDING", "MOVING", "STOPPING")
+STAGE_HELD: tuple[Mode, ...] = ("HOLDING", "MOVING", "STOPPING")
+HELD: tuple[Mode, ...] = ("LEVITATED", "SPINNING", *STAGE_HELD)
 """In which the rotor, or the axes of a stage, are held by their controller."""
 UNKNOWN, UNSEEN = "UNKNOWN", "UNSEEN"  # a state that has no name, and one that nothing tells
 LEVITATION_COMMANDS = (

@@ -13,8 +13,8 @@ from procedures.axis_friction.estimates import BIAS, COULOMB, RADIUS, VISCOUS, R
 from procedures.axis_friction.plan import Plan
 from procedures.axis_friction.steps import Pass
 from procedures.shared import signals
+from procedures.stages.recorded import not_held
 
-HELD = ("HOLDING", "MOVING", "STOPPING")
 SHARE = 0.01  # of samples that may be limited
 APART = 4.5  # standard uncertainties
 
@@ -25,17 +25,10 @@ def of_passes(passes: Sequence[Pass], rig: RigFile, plan: Plan) -> Iterator[Find
         text = "no axis was sent anywhere; expected the plan's passes (was the run stopped early?)"
         yield Finding("passes-missing", text, "", Effect.ERROR)
         return
-    for p in passes:
-        if other := [s for s in p.states if rig.binding.mode(s) not in HELD]:
-            yield Finding(
-                "axis-not-held",
-                f"the controller was in {', '.join(other)}: it did not hold the axes",
-                p.where,
-                Effect.ERROR,
-            )
-            return
-    lost, expected = np.array([(p.lost, p.expected) for p in passes], dtype=float).T
-    yield from signals.losses(lost, expected, plan.max_lost, lambda share: passes[int(np.argmax(share))].where)
+    if (wrong := not_held(((p.where, p.states) for p in passes), rig)) is not None:
+        yield wrong
+        return
+    yield from signals.losses_of(passes, plan.max_lost)
     worst = max(passes, key=lambda p: p.uneven)
     if worst.uneven > plan.max_uneven:
         text = (f"the rate differs by {worst.uneven:.1%} from one half of its window to the other; {plan.max_uneven:.1%} is "

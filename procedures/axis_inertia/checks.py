@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-import numpy as np
-
 from bench.findings import Effect, Finding
 from bench.rigfile import RigFile
 from procedures.axis_inertia.estimates import Result, named
@@ -13,8 +11,8 @@ from procedures.axis_inertia.plan import Plan
 from procedures.axis_inertia.sequence import part
 from procedures.axis_inertia.steps import Sine
 from procedures.shared import signals
+from procedures.stages.recorded import not_held
 
-HELD = ("HOLDING", "MOVING", "STOPPING")
 SHARE = 0.01  # of samples that may be limited
 FOLLOWED = 0.3  # of its amplitude: what is less is no sine that was followed
 LEAST = 0.02  # of what the axis moves, that a part adds
@@ -27,17 +25,10 @@ def of_sines(sines: Sequence[Sine], rig: RigFile, plan: Plan) -> Iterator[Findin
         text = "no axis played a sine; expected the plan's (was the run stopped early?)"
         yield Finding("sines-missing", text, "", Effect.ERROR)
         return
-    for s in sines:
-        if other := [name for name in s.states if rig.binding.mode(name) not in HELD]:
-            yield Finding(
-                "axis-not-held",
-                f"the controller was in {', '.join(other)}: it did not hold the axes",
-                s.where,
-                Effect.ERROR,
-            )
-            return
-    lost, expected = np.array([(s.lost, s.expected) for s in sines], dtype=float).T
-    yield from signals.losses(lost, expected, plan.max_lost, lambda share: sines[int(np.argmax(share))].where)
+    if (wrong := not_held(((s.where, s.states) for s in sines), rig)) is not None:
+        yield wrong
+        return
+    yield from signals.losses_of(sines, plan.max_lost)
     for s in sines:
         if s.limited > SHARE or s.went < FOLLOWED:
             text = (f"it went {s.went:.0%} of its sine, and did not get the force that its loop asks for "

@@ -16,6 +16,7 @@ from procedures.bearing_constant.estimates import K_B, Result
 from procedures.bearing_constant.plan import Plan
 from procedures.bearing_constant.steps import Visit
 from procedures.position_loops import recorded
+from procedures.shared import signals
 from procedures.shared.leastsquares import linear
 
 SURE = 4.5  # standard uncertainties that a sound rig does not reach
@@ -37,7 +38,7 @@ def of_signals(visits: Sequence[Visit], plan: Plan, rig: RigFile) -> Iterator[Fi
     if (told := recorded.not_held(((v.where, v.states) for v in visits), rig, "visit-not-held", "mover")) is not None:
         yield told
         return
-    yield from recorded.losses(visits, plan.max_lost)
+    yield from signals.losses_of(visits, plan.max_lost)
     worst = max(visits, key=lambda v: v.limited)
     if worst.limited > 0:
         text = f"a loop was at its limit in {worst.limited:.1%} of the time: then it holds nothing. Hang less."

@@ -16,6 +16,7 @@ from procedures.cogging_map.plan import Plan
 from procedures.cogging_map.steps import Pass
 from procedures.position_loops import recorded
 from procedures.position_loops.motors import around
+from procedures.shared import signals
 
 GAP = 0.25  # of a period of the highest harmonic, between neighbouring places
 PROGRESS = 0.05  # by which the speed may differ from the plan's
@@ -47,7 +48,7 @@ def of_signals(passes: Sequence[Pass], rig: RigFile, plan: Plan) -> Iterator[Fin
         text = "found less than two sweeps each way of a kind (was the run stopped early?)"
         yield Finding("no-sweeps", text, passes[-1].map.loop, Effect.ERROR)
         return
-    yield from recorded.losses(passes, plan.max_lost)
+    yield from signals.losses_of(passes, plan.max_lost)
     for loop in dict.fromkeys(p.map.loop for p in passes if p.limited):
         hit = [p for p in passes if p.map.loop == loop and p.limited]
         text = f"the loop was at its limit in {len(hit)} sweeps, {max(p.limited for p in hit):.1%} of the worst. Sweep slower."

@@ -16,6 +16,7 @@ from procedures.emf_constant.nameplate import compared
 from procedures.emf_constant.plan import Plan
 from procedures.emf_constant.steps import Taken
 from procedures.position_loops import recorded
+from procedures.shared import signals
 
 APART = 4.5  # standard uncertainties that what should be alike may lie apart
 GAINS = (
@@ -37,7 +38,7 @@ def of_signals(taken: Sequence[Taken], rig: RigFile, plan: Plan) -> Iterator[Fin
     if (told := recorded.not_held(((t.where, t.states) for t in taken), rig)) is not None:
         yield told
         return
-    yield from recorded.losses(taken, plan.max_lost)
+    yield from signals.losses_of(taken, plan.max_lost)
 
 
 def of_results(

@@ -16,6 +16,7 @@ from procedures.encoder_zero.plan import Plan
 from procedures.encoder_zero.steps import Answers, Taken, answers, column
 from procedures.position_loops import recorded
 from procedures.position_loops.motors import phase_rate
+from procedures.shared import signals
 
 DEG = 180 / math.pi
 APART = 4.5  # standard uncertainties by which a sound machine's places may be apart
@@ -36,7 +37,7 @@ def of_signals(taken: Sequence[Taken], rig: RigFile, plan: Plan) -> Iterator[Fin
     if (told := recorded.not_held(((t.where, t.states) for t in taken), rig, "mover-not-held", "mover")) is not None:
         yield told
         return
-    yield from recorded.losses(taken, plan.max_lost)
+    yield from signals.losses_of(taken, plan.max_lost)
     for group in groups(rig, plan):
         some = [t for t in taken if t.loop == group.loop]
         yield from _limited(some, group)

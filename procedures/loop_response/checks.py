@@ -16,6 +16,7 @@ from procedures.loop_response.plan import Plan
 from procedures.loop_response.steps import REFINED, Taken
 from procedures.position_loops import recorded
 from procedures.sensitivity.checks import SCOPE, ZONES
+from procedures.shared import signals
 
 OFF = 0.05  # share by which the captured sine may differ from what was asked for
 UNEXPLAINED = 1e-4  # chance that a sound run's lines lie so far off their curve, all its curves together
@@ -33,7 +34,7 @@ def of_signals(taken: Sequence[Taken], rig: RigFile, plan: Plan) -> Iterator[Fin
         yield told
         return
     yield from _held(taken, rig)
-    yield from recorded.losses(taken, plan.max_lost)
+    yield from signals.losses_of(taken, plan.max_lost)
     for t in taken:
         if t.line is not None and abs(t.line.wave - 1) > OFF:
             text = (f"the captured sine has {t.line.wave:.3g} of the amplitude asked for: another frequency, or none. Look at "

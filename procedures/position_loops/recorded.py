@@ -1,16 +1,13 @@
 """What can be wrong with what was recorded of a machine whose position loops hold it, whatever was done then: it was not
-captured, the loops did not hold it, samples are missing."""
+captured, or the loops did not hold it."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from typing import Protocol
-
-import numpy as np
 
 from bench.findings import Effect, Finding
 from bench.rigfile import RigFile
-from procedures.shared import signals
 
 LEVITATED = "LEVITATED"
 
@@ -20,15 +17,6 @@ class Placed(Protocol):
 
     @property
     def where(self) -> str: ...
-
-
-class Recorded(Placed, Protocol):
-    """And how many of the `expected` samples are `lost`."""
-
-    @property
-    def lost(self) -> int: ...
-    @property
-    def expected(self) -> int: ...
 
 
 def not_captured(code: str, plural: str, missing: Sequence[Placed], many: int) -> Finding | None:
@@ -47,9 +35,3 @@ def not_held(
             text = f"the controller was in {', '.join(other)}: its loops did not hold the {what}."
             return Finding(code, text, where, Effect.ERROR)
     return None
-
-
-def losses(taken: Sequence[Recorded], allowed: float) -> Iterator[Finding]:
-    """As `procedures.shared.signals.losses`, of steps."""
-    lost, expected = np.array([(t.lost, t.expected) for t in taken], dtype=float).T
-    yield from signals.losses(lost, expected, allowed, lambda share: taken[int(np.argmax(share))].where)

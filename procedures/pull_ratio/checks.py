@@ -17,6 +17,7 @@ from procedures.pull_ratio.estimates import CONSTANT, LEVER, RATIO, TURN, Result
 from procedures.pull_ratio.plan import Plan
 from procedures.pull_ratio.planes import planes
 from procedures.pull_ratio.steps import Taken
+from procedures.shared import signals
 
 APART = 3.0  # standard uncertainties: two rectangular gains end at 2.4 of theirs together
 SURE = 5.0  # standard uncertainties of noise beside what is allowed
@@ -38,7 +39,7 @@ def of_signals(taken: Sequence[Taken], rig: RigFile, plan: Plan) -> Iterator[Fin
     if (told := recorded.not_held(((t.where, t.states) for t in taken), rig)) is not None:
         yield told
         return
-    yield from recorded.losses(taken, plan.max_lost)
+    yield from signals.losses_of(taken, plan.max_lost)
     if hit := [t for t in taken if t.limited > 0]:
         worst = max(hit, key=lambda t: t.limited)
         text = (f"a loop was at its limit in {len(hit)} of {len(taken)} levels ({worst.limited:.1%} of the time in the worst). "

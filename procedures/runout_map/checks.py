@@ -13,6 +13,7 @@ from procedures.position_loops import recorded
 from procedures.runout_map.estimates import Results, mean
 from procedures.runout_map.plan import Plan
 from procedures.runout_map.steps import Turned
+from procedures.shared import signals
 
 GAP = 0.02  # of a turn, between neighbouring angles
 PROGRESS = 0.05  # by which the speed may differ from the plan's
@@ -35,7 +36,7 @@ def of_signals(turned: Sequence[Turned], rig: RigFile, plan: Plan) -> Iterator[F
         if (told := _covered(t, plan)) is not None:
             yield told
             return
-    yield from recorded.losses(turned, plan.max_lost)
+    yield from signals.losses_of(turned, plan.max_lost)
 
 
 def _covered(t: Turned, plan: Plan) -> Finding | None:

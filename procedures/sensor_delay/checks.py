@@ -12,6 +12,7 @@ from procedures.sensor_delay.estimates import Result
 from procedures.sensor_delay.plan import Plan
 from procedures.sensor_delay.sines import crossover_hz
 from procedures.sensor_delay.steps import Taken
+from procedures.shared import signals
 
 OFF = 0.05  # share by which the captured sine may differ from what was asked for
 UNEXPLAINED = 1e-4  # chance that a sound run's phases lie so far off a delay's line, all probes together
@@ -31,7 +32,7 @@ def of_signals(taken: Sequence[Taken], rig: RigFile, plan: Plan) -> Iterator[Fin
     if (told := recorded.not_held(((t.where, t.states) for t in taken), rig)) is not None:
         yield told
         return
-    yield from recorded.losses(taken, plan.max_lost)
+    yield from signals.losses_of(taken, plan.max_lost)
     if ability(rig).wave and (wrong := [t for t in taken if abs(t.wave - 1) > OFF]):
         text = (f"the captured sine has {wrong[0].wave:.3g} of the amplitude asked for: another frequency, or none. Look at "
                 "the rig file's capabilities.loop_injection.")  # fmt: skip

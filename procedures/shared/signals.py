@@ -6,6 +6,7 @@ Arrays have one entry per step, in any shape; `where` names the step of the grea
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +20,17 @@ Meaning = tuple[int, str, str]
 SAME_M = 1.5e-8  # apart, and positions are still the same: one and a half of their digits on the bus
 
 
+class Recorded(Protocol):
+    """A step: `where` it was, and how many of the `expected` samples are `lost`."""
+
+    @property
+    def where(self) -> str: ...
+    @property
+    def lost(self) -> int: ...
+    @property
+    def expected(self) -> int: ...
+
+
 def losses(lost: Array, expected: Array, allowed: float, where: Where) -> Iterator[Finding]:
     """Steps in which more than the share `allowed` of the samples is missing."""
     share = lost / np.maximum(expected, 1)
@@ -30,6 +42,12 @@ def losses(lost: Array, expected: Array, allowed: float, where: Where) -> Iterat
             where(share),
             Effect.INDETERMINATE,
         )
+
+
+def losses_of(steps: Sequence[Recorded], allowed: float) -> Iterator[Finding]:
+    """The same of steps that say it of themselves."""
+    lost, expected = np.array([(s.lost, s.expected) for s in steps], dtype=float).T
+    yield from losses(lost, expected, allowed, lambda share: steps[int(np.argmax(share))].where)
 
 
 def stuck(spread: Mapping[str, Array], channels: Sequence[str]) -> Iterator[Finding]:

@@ -14,13 +14,13 @@ from bench.procedure import Quantity
 from bench.procedure.requires import Requires
 from bench.recording import Recording, Step
 from bench.rigfile import RigFile
+from bench.rigfile.binding import STAGE_HELD
 from bench.rigfile.stage import StageAxis, axes_of
 from procedures.shared import signals
 from procedures.stages.counts import lacks_counts, pitch_of
 
 Array = npt.NDArray[np.float64]
 STATE = "state"
-HELD = ("HOLDING", "MOVING", "STOPPING")
 TOGETHER = "together"
 INTEGRATORS = "integrators"
 STANDS = 1.5  # counts, in which a reading that stands may change
@@ -165,7 +165,7 @@ def of_signals(tracks: Mapping[str, Sequence[Track]], max_lost: float) -> Iterat
     """By mode and axis: losses, states in which nothing was held, encoders that never moved."""
     every = [(where, t) for where, some in tracks.items() for t in some]
     for where, t in every:
-        if other := [m for m in t.modes if m not in HELD]:
+        if other := [m for m in t.modes if m not in STAGE_HELD]:
             text = f"the controller was in {', '.join(other)}: it did not hold the axes"
             yield Finding("axis-not-held", text, where, Effect.ERROR)
             return

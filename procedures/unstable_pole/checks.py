@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 
 from bench.findings import Effect, Finding
 from bench.rigfile import RigFile
-from procedures.position_loops import recorded
 from procedures.position_loops.recorded import LEVITATED
+from procedures.shared import signals
 from procedures.unstable_pole.estimates import Result
 from procedures.unstable_pole.plan import Plan
 from procedures.unstable_pole.steps import Taken
@@ -35,7 +35,7 @@ def of_signals(taken: Sequence[Taken], rig: RigFile, plan: Plan) -> Iterator[Fin
         text = (f"after {len(fell)} of {len(taken)} shots the shaft was not back: it read {worst.caught * 1e6:.0f} µm at the "
                 "end of the capture. Push less, or hold for less time.")  # fmt: skip
         yield Finding("not-caught", text, worst.where, Effect.ERROR)
-    yield from recorded.losses(taken, plan.max_lost)
+    yield from signals.losses_of(taken, plan.max_lost)
     moved = [t for t in taken if t.moved > STILL * plan.push_A]
     if moved:
         text = (f"in {len(moved)} of {len(taken)} shots the currents did not stay where they were held, by "
