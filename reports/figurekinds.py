@@ -36,7 +36,8 @@ def special(axes: Axes, series: Series, look: dict[str, Any], position: int, lab
 
 
 def bands(axes: Axes, figure: Figure) -> list[Artist]:
-    """Shaded bands behind the curves; the axis goes on to show where the worst begins, not to its end."""
+    """Shaded bands behind the curves; the axis goes on to show where the worst begins, not to its end, and from where the best
+    one begins, or from below a curve that goes farther down."""
     if not figure.bands:
         return []
     out: list[Artist] = []
@@ -45,7 +46,9 @@ def bands(axes: Axes, figure: Figure) -> list[Artist]:
     for k, (label, low, high) in enumerate(figure.bands):
         colour = ZONES[min(k, len(ZONES) - 1)]
         out.append(axes.axhspan(low, min(high, top), color=colour, linewidth=0, zorder=0, label=label))
-    axes.set_ylim(figure.bands[0][1], top)
+    low = figure.bands[0][1]
+    deepest = min([low, *(float(np.nanmin(s.y)) for s in figure.series if s.y.size)])
+    axes.set_ylim(low if deepest == low else deepest - 0.06 * (top - deepest), top)
     return out
 
 

@@ -33,8 +33,6 @@ def transition(rig: Rig, target: RigState) -> None:
             _up(rig, here)
         if here < goal and order.index(rig.levitation.state) <= here:
             raise RuntimeError(f"the rig stays in {order[here]}")
-        if here == DRIVEN and goal == CARRIED:
-            continue
 
 
 def _up(rig: Rig, here: int) -> None:

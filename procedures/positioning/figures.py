@@ -44,7 +44,7 @@ def _diagram(r: Result) -> Figure:
                "approach, means each way, and ±2 s as thin lines. A is from the lowest to the highest of these, E and M are "
                "those of the means. Ways stand a little aside, so that both show.")  # fmt: skip
     return Figure(f"deviations-{r.name}", f"Deviations by target, {r.name}", caption, f"target / {place}",
-                  f"deviation / {small}", tuple(series), lines=(("A", low), ("", high)))  # fmt: skip
+                  f"deviation / {small}", tuple(series), lines=(("A, from", low), ("A, to", high)))  # fmt: skip
 
 
 def _over_time(r: Result) -> Figure:
