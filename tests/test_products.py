@@ -63,7 +63,7 @@ def test_results_are_those_that_were_measured(tmp_path: Path) -> None:
 def test_curves_say_their_series_and_leave_an_error_bar_out_where_there_is_none(tmp_path: Path) -> None:
     with written(tmp_path, "csv")["figure-size.csv"].open(newline="") as file:
         head, *rows = csv.reader(file)
-    assert head == ["series", "x: frequency (Hz)", "y: |S| (dB)", "95 % of y, +/-"]
+    assert head == ["series", "x: frequency (Hz)", "y: |S| (dB)", "U (95 %)"]
     assert rows == [
         ["measured", "10", "0.5", "0.1"],
         ["measured", "20", "6", "0.2"],

@@ -29,6 +29,7 @@ class Table(StrEnum):
     PARQUET = "parquet"
     CSV = "csv"
     MCAP = "mcap"
+    MDF = "mdf"
     BLF = "blf"
     ASC = "asc"
     CANDUMP = "candump"

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
 from bench.calibration import Calibration
@@ -25,10 +27,13 @@ MOST_JSON = 8 << 20  # bytes of an attachment that is no DBC
 
 
 class Attachments(Generic[P]):
-    """The attachments and the metadata of one recording, whose plan is of a type, None where nobody asks for it."""
+    """The attachments and the metadata of one recording, whose plan is of a type, None where nobody asks for it. `settings` of
+    it are other ones than it was made with, for an analysis that tries them."""
 
-    def __init__(self, file: McapFile, plan: type[P] | None) -> None:
-        self._file, self._plan_class = file, plan
+    def __init__(
+        self, file: McapFile, plan: type[P] | None, settings: Mapping[str, Any] = MappingProxyType({})
+    ) -> None:
+        self._file, self._plan_class, self._settings = file, plan, settings
         self.path: Path = file.path
 
     @cached_property
@@ -71,7 +76,9 @@ class Attachments(Generic[P]):
             RecordingError: the plan is not there, cannot be read, or is of a newer schema.
         """
         try:
-            return storedplan.migrated(self._json("plan.json", dict), self.run.get("procedure", ""))
+            return storedplan.migrated(self._json("plan.json", dict), self.run.get("procedure", "")) | dict(
+                self._settings
+            )
         except ConfigError as error:
             raise RecordingError(f"recording {self.path}: {error}") from error
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, TypeVar, cast
 
 import numpy as np
@@ -39,8 +40,10 @@ BLOCK_NS = 2_000_000_000  # no block is longer: how far back a block that reache
 class Recording(Attachments[P]):
     """One recording, closed. Open with `Recording.open`."""
 
-    def __init__(self, file: McapFile, plan: type[P] | None) -> None:
-        super().__init__(file, plan)
+    def __init__(
+        self, file: McapFile, plan: type[P] | None, settings: Mapping[str, Any] = MappingProxyType({})
+    ) -> None:
+        super().__init__(file, plan, settings)
         self._kept: Kept[tuple[bytes, DecodedBlock]] = Kept(KEPT, KEPT_BYTES)
         self._made: dict[Callable[[Any], Any], Any] = {}
         self.version = int(file.metadata["layout"]["version"])
@@ -48,8 +51,10 @@ class Recording(Attachments[P]):
         self.truncated = file.truncated or self.integrity is None
 
     @classmethod
-    def open(cls, path: Path, plan: type[P] | None = None) -> Recording[P]:
-        """Open and check a recording.
+    def open(
+        cls, path: Path, plan: type[P] | None = None, settings: Mapping[str, Any] = MappingProxyType({})
+    ) -> Recording[P]:
+        """Open and check a recording. `settings` take the place of those of its plan.
 
         Raises:
             RecordingError: not a recording of ours, of a newer layout, or damaged. A file that was only cut off opens
@@ -66,7 +71,7 @@ class Recording(Attachments[P]):
                 f"{path}: layout version: found {version}; expected at most {layout.VERSION}. It was recorded with a "
                 "newer Levbench: use that one, or `bench export` there"
             )
-        return cls(file, plan)
+        return cls(file, plan, settings)
 
     @cached_property
     def _layouts(self) -> dict[str, StreamLayout]:

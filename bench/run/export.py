@@ -1,14 +1,18 @@
-"""A run's recording as files for other tools: tables (Parquet, CSV), or MCAP with one scalar message per sample."""
+"""A run's recording as files for other tools: tables (Parquet, CSV), MDF 4, or MCAP with one scalar message per sample.
+
+Columns are called alike in each: `t_s`, `t_ns`, `index`, `tick`, the channels by their names, and at the end `step` and
+`step_kind`. Units stand in `columns.<to>`, and in Parquet with the fields, too.
+"""
 
 from __future__ import annotations
 
 import json
 import os
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Literal
 
-import numpy as np
 import pyarrow as pa
 from mcap.writer import CompressionType, Writer
 from pyarrow import csv, parquet
@@ -16,27 +20,25 @@ from pyarrow import csv, parquet
 from bench import rundir
 from bench.errors import BenchError
 from bench.recording import Recording, layout
-from bench.samples import StreamLayout
+from bench.run import columns, mdf
 
 Tabular = Literal["parquet", "csv"]
-Format = Literal[Tabular, "mcap"]
-ROW_GROUP: Final = 1 << 16
-"""Rows of a Parquet row group: a minute at 1 kHz."""
-EVENTS: Final = pa.schema([("t_ns", pa.int64()), ("kind", pa.string()), ("data", pa.string())])
+Format = Literal[Tabular, "mcap", "mdf"]
 
 
 def export(run: Path, to: Format, out: Path | None = None) -> tuple[Path, ...]:
     """Write a run's streams and events into folder `out` (default RUN/export), replacing older exports.
 
-    `parquet` and `csv` give `<stream>.<to>`, `capture-<n>.<to>` and `events.<to>`; `mcap` gives `samples.mcap`, where every
-    sample is a message of scalars that Foxglove and PlotJuggler plot at full rate. Each file appears whole or not at all. Of a
-    truncated recording, what was written before it was cut off.
+    `parquet` and `csv` give `<stream>.<to>`, `capture-<n>.<to>`, `steps.<to>`, `events.<to>` and `columns.<to>`, which has the
+    units; `mdf` gives `samples.mf4`, a channel group for each stream; `mcap` gives `samples.mcap`, where every sample is a
+    message of scalars that Foxglove and PlotJuggler plot at full rate. Each file appears whole or not at all. Of a truncated
+    recording, what was written before it was cut off.
 
     Returns:
         the files.
 
     Raises:
-        ConfigError: `run` is no run directory.
+        ConfigError: `run` is no run directory, or what writes MDF is not installed.
         RecordingError: the recording cannot be read.
         BenchError: a file cannot be written.
     """
@@ -47,6 +49,8 @@ def export(run: Path, to: Format, out: Path | None = None) -> tuple[Path, ...]:
         folder.mkdir(parents=True, exist_ok=True)
         if to == "mcap":
             return (whole_file(folder / "samples.mcap", lambda part: _write_mcap(part, recording)),)
+        if to == "mdf":
+            return (whole_file(folder / "samples.mf4", partial(mdf.write, recording)),)
         return tuple(_tables(folder, to, recording))
     except OSError as error:
         raise BenchError(f"{folder}: cannot be written: {error.strerror or error}; the run is untouched") from error
@@ -77,10 +81,14 @@ def whole_table(path: Path, to: Tabular, rows: pa.RecordBatch) -> Path:
 
 
 def _tables(folder: Path, to: Tabular, recording: Recording[Any]) -> Iterator[Path]:
+    schemas: dict[str, pa.Schema] = {}
     for stream in (*recording.streams.values(), *recording.capture_streams.values()):
-        schema = _schema(stream, with_units=to == "csv")
-        yield _table(folder / f"{stream.name.replace('/', '-')}.{to}", to, schema, _batches(recording, stream, schema))
-    yield whole_table(folder / f"events.{to}", to, _events(recording))
+        name = stream.name.replace("/", "-")
+        schemas[name] = columns.schema_of(stream)
+        yield _table(folder / f"{name}.{to}", to, schemas[name], columns.batches(recording, stream))
+    for name, rows in (("steps", columns.steps_of(recording)), ("events", columns.events_of(recording))):
+        yield whole_table(folder / f"{name}.{to}", to, rows)
+    yield whole_table(folder / f"columns.{to}", to, columns.units_of(schemas))
 
 
 def _table(path: Path, to: Tabular, schema: pa.Schema, batches: Iterator[pa.RecordBatch]) -> Path:
@@ -93,48 +101,10 @@ def _table(path: Path, to: Tabular, schema: pa.Schema, batches: Iterator[pa.Reco
                     lines.write_batch(batch)
             return
         with parquet.ParquetWriter(part, schema) as groups:
-            for table in _row_groups(batches):
+            for table in columns.row_groups(batches):
                 groups.write_table(table, row_group_size=max(table.num_rows, 1))
 
     return whole_file(path, write)
-
-
-def _row_groups(batches: Iterator[pa.RecordBatch]) -> Iterator[pa.Table]:
-    """Batches put together to ROW_GROUP rows: each row group repeats a description of every column."""
-    waiting: list[pa.RecordBatch] = []
-    for batch in batches:
-        waiting.append(batch)
-        if sum(b.num_rows for b in waiting) >= ROW_GROUP:
-            yield pa.Table.from_batches(waiting)
-            waiting = []
-    if waiting:
-        yield pa.Table.from_batches(waiting)
-
-
-def _schema(stream: StreamLayout, *, with_units: bool) -> pa.Schema:
-    """Sample time (UNIX ns), index (lost samples counted too), device tick, and the channels in SI.
-
-    Parquet keeps the unit as metadata of the field; CSV can only carry it in the heading.
-    """
-    head = [pa.field("t_ns", pa.int64()), pa.field("index", pa.int64()), pa.field("tick", pa.uint64())]
-    for c in stream.channels:
-        name = f"{c.name} [{c.unit}]" if with_units and c.unit not in ("", "1") else c.name
-        kind = {"f4": pa.float32(), "f8": pa.float64(), "u2": pa.uint32()}[c.dtype]
-        head.append(pa.field(name, kind, metadata={"unit": c.unit}))
-    return pa.schema(head)
-
-
-def _batches(recording: Recording[Any], stream: StreamLayout, schema: pa.Schema) -> Iterator[pa.RecordBatch]:
-    for block in recording.blocks(stream.name):
-        index = np.arange(block.first, block.first + block.count, dtype=np.int64)
-        columns = [block.t_ns, index, block.ticks, *(block.columns[c.name] for c in stream.channels)]
-        yield pa.record_batch([pa.array(column) for column in columns], schema=schema)
-
-
-def _events(recording: Recording[Any]) -> pa.RecordBatch:
-    rows = recording.events()
-    data = [json.dumps({k: v for k, v in e.items() if k not in ("kind", "t_ns")}) for e in rows]
-    return pa.record_batch([[e["t_ns"] for e in rows], [e["kind"] for e in rows], data], schema=EVENTS)
 
 
 def _write_mcap(part: Path, recording: Recording[Any]) -> None:

@@ -69,7 +69,7 @@ def curves(figure: Figure) -> pa.RecordBatch:
     columns = {
         f"x: {figure.x_label}": np.concatenate([_flat(s.x) for s in parts]),
         f"y: {figure.y_label}": np.concatenate([_flat(s.y) for s in parts]),
-        "95 % of y, +/-": np.concatenate([np.full(np.size(s.y), np.nan) if s.u is None else _flat(s.u) for s in parts]),
+        "U (95 %)": np.concatenate([np.full(np.size(s.y), np.nan) if s.u is None else _flat(s.u) for s in parts]),
     }
     labels = [s.label for s in parts for _ in range(np.size(s.y))]
     return pa.record_batch({"series": pa.array(labels, pa.string()), **_numbers(columns)})

@@ -139,12 +139,13 @@ def test_as_a_table(session: Session) -> None:
 
 def test_exports(session: Session, tmp_path: Path) -> None:
     paths = export(session.run, "csv", tmp_path)
-    assert {p.name for p in paths} == {"telemetry.csv", "capture-1.csv", "capture-2.csv", "capture-3.csv", "events.csv"}
+    captures = {"capture-1.csv", "capture-2.csv", "capture-3.csv"}
+    assert {p.name for p in paths} == {"telemetry.csv", *captures, "steps.csv", "events.csv", "columns.csv"}
     with (tmp_path / "capture-3.csv").open() as file:
         rows = list(csv.reader(file))
-    assert rows[0] == ["t_ns", "index", "tick", "pos_zo [m]", "inject [A]"]
+    assert rows[0] == ["t_s", "t_ns", "index", "tick", "pos_zo", "inject", "step", "step_kind"]
     assert len(rows) == 501
-    assert int(rows[2][2]) - int(rows[1][2]) == 2
+    assert int(rows[2][3]) - int(rows[1][3]) == 2
     assert export(session.run, "mcap", tmp_path)[0].stat().st_size > 100_000
 
 

@@ -1,0 +1,1 @@
+"""Stored runs for scripts and notebooks. Users come through `bench.open_run` and `bench.runs`."""
