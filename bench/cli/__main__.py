@@ -55,6 +55,35 @@ def list_(
 
 
 @app.command()
+def completion(
+    shell: Annotated[str, typer.Argument(metavar="SHELL", help="bash, zsh or fish; default: yours.")] = "",
+) -> int:
+    """Write a script that completes commands, options and names.
+
+    Bash: eval "$(bench completion bash)" in ~/.bashrc.
+    """
+    from bench.cli.completion import completion_command
+
+    return completion_command(shell, app)
+
+
+@app.command()
+def schema(
+    kind: Annotated[
+        str, typer.Argument(metavar="KIND", help="rig, spec, campaign or plan-PROCEDURE; default: all, into a folder.")
+    ] = "",
+    into: Annotated[Path | None, typer.Option("--into", metavar="FOLDER", help="Default for all: schemas.")] = None,
+) -> int:
+    """Write JSON schemas of rig files, specs, campaigns and plans, for editors.
+
+    One goes to standard output, all go into a folder.
+    """
+    from bench.cli.schemas import schema_command
+
+    return schema_command(kind, into)
+
+
+@app.command()
 def check(
     rig: o.RigArgument,
     procedure: Annotated[str, typer.Argument(metavar="PROCEDURE", help="Say all that it lacks for this one.")] = "",

@@ -6,6 +6,7 @@ stored runs are analysed without it.
 
 from __future__ import annotations
 
+import difflib
 import importlib
 import shlex
 import sys
@@ -168,7 +169,9 @@ def with_links(rig: RigFile, assignments: Sequence[str]) -> RigFile:
     for text in assignments:
         name, equals, url = text.partition("=")
         if not equals or name not in links:
-            raise ConfigError(f"--link {text}: expected NAME=URL with NAME one of {', '.join(links)}")
+            close = difflib.get_close_matches(name, links, 1)
+            hint = f". Did you mean {close[0]}?" if close and name not in links else ""
+            raise ConfigError(f"--link {text}: expected NAME=URL with NAME one of {', '.join(links)}{hint}")
         try:
             parsed = linkurl.parse(url)
             if parsed.scheme in linkurl.TCP_SCHEMES:

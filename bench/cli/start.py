@@ -11,6 +11,11 @@ ABORTED = 4
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns its exit status."""
     try:
+        given = sys.argv[1:] if arguments is None else arguments
+        if given[:1] == ["_complete"]:  # a key was pressed: no command line need be understood
+            from bench.cli.completing import complete
+
+            return complete(given[1:])
         from bench.cli.__main__ import main as run
 
         return run(arguments)

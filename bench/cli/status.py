@@ -5,8 +5,10 @@
 
 from __future__ import annotations
 
+import difflib
 import errno
 import os
+import re
 import sys
 import traceback
 from pathlib import Path
@@ -63,6 +65,8 @@ def _dispatch(app: typer.Typer, arguments: list[str]) -> int:
         show = getattr(error, "show", None)
         if show is None or not hasattr(error, "format_message"):
             raise
+        if isinstance(told := getattr(error, "message", None), str):
+            error.message = _nearest(told)  # type: ignore[attr-defined]
         show()
         return USAGE
     if status == INTERRUPTED:
@@ -74,3 +78,12 @@ def _told(text: str, status: int) -> int:
     sys.stderr.write(f"bench: {text}\n")
     sys.stderr.flush()
     return status
+
+
+def _nearest(told: str) -> str:
+    """A message of the library that a choice is none, in our words, with the nearest one."""
+    found = re.search(r"'([^']*)' is not one of (.*)\.$", told)
+    if found is None:
+        return told
+    close = difflib.get_close_matches(found[1], re.findall(r"'([^']*)'", found[2]), 1)
+    return told.removeprefix("Value error, ") + (f" Did you mean {close[0]!r}?" if close else "")

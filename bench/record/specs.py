@@ -67,6 +67,10 @@ class _Entry(BaseModel):
         return Limit(self.nominal - half, self.nominal + half, self.unit, self.source, self.verified, at)
 
 
+LIMIT_MODEL: type[BaseModel] = _Entry
+"""What reads a limit of the file; its schema is made of it."""
+
+
 def _setting(key: str, value: Any) -> Setting:
     if not isinstance(value, _Range):
         if value == []:
