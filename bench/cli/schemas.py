@@ -171,7 +171,9 @@ def _plain(value: Any) -> Any:
         return [_plain(v) for v in value]
     if not isinstance(value, dict):
         return value
-    kept = {k: _plain(v) for k, v in value.items() if k != "title" and not (k == "default" and v is None)}
+    default = value.get("default", 0)
+    dropped = ("title", "default") if default is None or isinstance(default, dict) else ("title",)
+    kept = {k: _plain(v) for k, v in value.items() if k not in dropped}
     some = [v for v in kept.get("anyOf", []) if v != {"type": "null"}]
     if "anyOf" in kept and len(some) == 1:
         kept = {**some[0], **{k: v for k, v in kept.items() if k != "anyOf"}}
