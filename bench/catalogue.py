@@ -87,10 +87,13 @@ class RigEntry:
     title: str
 
 
+PACKAGED = Path(__file__).resolve().parent / "data"
+
+
 def shipped(kind: str) -> Path:
-    """The folder of the `rigs`, `specs` or `campaigns` that Levbench brings: in a clone beside the packages, and in
-    `bench/data` where it is installed, so that site-packages hold our packages alone."""
-    inside = Path(__file__).resolve().parent / "data" / kind
+    """The folder of the `rigs`, `specs` or `campaigns` that Levbench brings: in a clone beside the packages, and in one of
+    them where it is installed, so that site-packages hold our packages alone."""
+    inside = PACKAGED / kind
     return inside if inside.is_dir() else Path(__file__).resolve().parents[1] / kind
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -121,8 +122,34 @@ def test_a_plain_user_runs_it_without_compiler_and_network(installed: Installed)
     record = json.loads((installed.home / run / "record.json").read_text(encoding="utf-8"))
     assert record["outcome"] == "PASS"
     assert (installed.home / run / "report.html").exists()
+    done = installed("bench", "adopt", str(run))
+    assert done.returncode == 0, done.stderr
+    assert (installed.home / "rigs/tsbs12.calibrations/sim-0/amb-calibration.json").exists()
+    assert "amb-calibration" in installed("bench", "calibrations", "tsbs12").stdout
     assert installed.files() == before
     assert not (installed.home / ".cache/levbench").exists()  # nothing was built
+
+
+def test_the_page_s_commands_install_it(wheel: Path, tmp_path: Path) -> None:
+    """Without an index; what Levbench depends on is in the environment of the tests."""
+    page = (ROOT / "docs/how-to/install.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"```bash\n(.*?)```", page, re.DOTALL)
+    shutil.copy(wheel, tmp_path)
+    own = {
+        "PATH": os.environ["PATH"],
+        "HOME": str(tmp_path),
+        "PIP_NO_INDEX": "1",
+        "PIP_NO_DEPS": "1",
+        "PIP_NO_COMPILE": "1",
+    }
+    for line in block.splitlines():
+        program = line.split()[0]
+        more = {"PYTHONPATH": sysconfig.get_paths()["purelib"]} if program.endswith("/bench") else {}
+        done = subprocess.run(
+            ["bash", "-c", line], cwd=tmp_path, env=own | more, text=True, capture_output=True, check=False
+        )
+        assert done.returncode == 0, f"{line}\n{done.stderr}"
+    assert "amb-calibration" in done.stdout
 
 
 def test_without_a_compiled_core_it_is_built_once_for_the_user(installed: Installed) -> None:
