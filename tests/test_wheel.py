@@ -10,6 +10,7 @@ import shutil
 import subprocess
 import sys
 import sysconfig
+import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -98,6 +99,20 @@ def installed(wheel: Path, tmp_path: Path) -> Iterator[Installed]:
 
 def test_a_wheel_holds_what_it_must_and_nothing_else(wheel: Path) -> None:
     assert list(check_wheel.problems(wheel)) == []
+
+
+def test_what_is_wrong_with_a_wheel_is_told(wheel: Path, tmp_path: Path) -> None:
+    """Of one that lacks a rig and a compiled core, brings benchmarks, and says that it runs anywhere."""
+    lacking = tmp_path / f"{'-'.join(wheel.stem.split('-')[:2])}-py3-none-any.whl"
+    with zipfile.ZipFile(wheel) as whole, zipfile.ZipFile(lacking, "w") as file:
+        for name in whole.namelist():
+            if name != "bench/data/rigs/lira.toml" and "/core-" not in name:
+                file.writestr(name, whole.read(name))
+        file.writestr("benchmarks/core.py", "")
+    told = list(check_wheel.problems(lacking))
+    assert [problem.split(":")[0] for problem in told] == [
+        "bench/data/rigs/lira.toml", "benchmarks/core.py", "sim_backend/core/", lacking.name,
+    ]  # fmt: skip
 
 
 def test_site_packages_hold_our_packages_and_data_alone(installed: Installed) -> None:
