@@ -9,7 +9,7 @@ READY := .venv/.ready
 # Tests start hundreds of processes: without its bytecode every one of them would compile the project again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test check format ci-long faults links fuzz campaigns plants sound moved golden former bench clean lock setup
+.PHONY: demo test check format ci-long faults links fuzz campaigns plants sound moved golden former bench clean lock setup wheel
 
 demo: setup
 	$(BIN)/bench run amb-calibration --rig tsbs12 --seed 1
@@ -85,6 +85,24 @@ bench: setup
 	$(BIN)/python benchmarks/capture.py
 	$(BIN)/python benchmarks/dead_host.py --runs 3
 
+# A wheel for this platform, for every Python: compiled, named by what it needs of the system's C library, and checked. It is in dist/.
+TOOLS := build/wheel-tools
+wheel: setup $(TOOLS)/.ready
+	rm -rf build/lib build/bdist.* build/wheel dist
+	nice $(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation --wheel-dir build/wheel .
+ifeq ($(shell uname -s),Linux)
+	PATH="$(CURDIR)/$(TOOLS)/bin:$$PATH" auditwheel repair --wheel-dir dist build/wheel/levbench-*.whl
+	$(TOOLS)/bin/auditwheel show dist/levbench-*.whl
+else
+	mkdir -p dist && cp build/wheel/levbench-*.whl dist
+endif
+	$(BIN)/python install/check_wheel.py dist/levbench-*.whl
+
+$(TOOLS)/.ready: install/wheel-tools.txt
+	$(PYTHON) -m venv $(TOOLS)
+	$(TOOLS)/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r install/wheel-tools.txt
+	@touch $@
+
 format: setup
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
@@ -104,4 +122,4 @@ lock:
 	    --no-header --quiet -o requirements.lock
 
 clean:
-	rm -rf .venv build *.egg-info sim_backend/core/*.so
+	rm -rf .venv build dist *.egg-info sim_backend/core/*.so

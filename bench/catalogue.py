@@ -87,8 +87,18 @@ class RigEntry:
     title: str
 
 
-INSTALLED = Path(__file__).resolve().parent.parent / "rigs"
-INSTALLED_CAMPAIGNS = INSTALLED.with_name("campaigns")
+PACKAGED = Path(__file__).resolve().parent / "data"
+
+
+def shipped(kind: str) -> Path:
+    """The folder of the `rigs`, `specs` or `campaigns` that Levbench brings: in a clone beside the packages, and in one of
+    them where it is installed, so that site-packages hold our packages alone."""
+    inside = PACKAGED / kind
+    return inside if inside.is_dir() else Path(__file__).resolve().parents[1] / kind
+
+
+INSTALLED = shipped("rigs")
+INSTALLED_CAMPAIGNS = shipped("campaigns")
 
 
 def entry(name: str) -> Entry:

@@ -13,6 +13,7 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
+from bench import catalogue
 from bench.calibration import (
     Calibration,
     Need,
@@ -25,7 +26,7 @@ from bench.calibration import (
 )
 from bench.calibration.file import attached, attachment, from_json, read, to_json, write
 from bench.calibration.lookup import Lookup
-from bench.calibration.store import Store, stores_of
+from bench.calibration.store import Store, base_of, stores_of
 from bench.errors import ConfigError
 from bench.rigfile import RigFile, load_rig
 from bench.run.adoption import refuse_other_rig
@@ -328,3 +329,15 @@ def test_a_calibration_that_lacks_a_value_is_refused_before_the_run(rig: RigFile
         ConfigError, match=f"does not hold alpha_z; it has {', '.join(held)}\n    next: bench run amb-cal"
     ):
         lookup.found("lift-off", [Need("amb-calibration", facts=(*held, "alpha_z"))])
+
+
+def test_those_of_an_installed_rig_do_not_lie_in_the_package(
+    tmp_path: Path, rig: RigFile, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Which may be read-only, and goes with the next version."""
+    monkeypatch.setattr(catalogue, "PACKAGED", tmp_path / "bench/data")
+    paths = (tmp_path / part / "tsbs12.toml" for part in ("bench/data/rigs", "rigs"))
+    inside, own = (rig.model_copy(update={"path": str(path)}) for path in paths)
+    assert base_of(inside) == Path("rigs/tsbs12.calibrations")
+    assert base_of(inside, tmp_path) == tmp_path
+    assert base_of(own) == tmp_path / "rigs/tsbs12.calibrations"

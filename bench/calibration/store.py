@@ -1,4 +1,5 @@
 """Where calibrations lie: beside the rig file, a folder for each machine, the current one of each procedure and the older.
+Those of a rig file that was installed with Levbench lie in `./rigs`.
 
 rigs/tsbs12.toml
 rigs/tsbs12.calibrations/live/amb-calibration.json
@@ -14,6 +15,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
+from bench import catalogue
 from bench.calibration import file
 from bench.calibration.calibration import Calibration
 from bench.errors import ConfigError
@@ -105,9 +107,11 @@ class Store:
 
 
 def base_of(rig: RigFile, base: Path | None = None) -> Path:
-    """The folder of all calibrations of a rig file: `<stem>.calibrations` beside it, unless another is given."""
+    """The folder of all calibrations of a rig file: `<stem>.calibrations` beside it, unless another is given; in `./rigs`
+    if the file is part of an installed package, which is not written into: what is known of a machine would go with it."""
     path = Path(rig.path)
-    return base or path.with_name(path.stem + SUFFIX)
+    folder = Path("rigs") if catalogue.PACKAGED in path.parents else path.parent
+    return base or folder / (path.stem + SUFFIX)
 
 
 def machine(seed: int | None) -> str:

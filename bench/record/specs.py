@@ -26,7 +26,7 @@ from bench.rigfile.aliases import by_names, known_as
 SCHEMA = 1
 NOT_APPLIED = "limit-not-applied"  # a note: the limit was stated for other settings
 LIMIT_UNIT = "limit-unit"
-INSTALLED = Path(__file__).resolve().parents[2] / "specs"
+INSTALLED = catalogue.shipped("specs")
 
 
 _STRICT = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from cffi import FFI
 
+from bench.errors import ConfigError
 from sim_backend.core.build import library
 
 Array = npt.NDArray[np.float64]
@@ -23,12 +24,23 @@ COMMON: Final = Path(__file__).with_name("core.h")
 
 
 def open_core(header: Path) -> tuple[FFI, Any]:
-    """The core with what it declares in common and in a machine's `header`, between the marks."""
+    """The core with what it declares in common and in a machine's `header`, between the marks.
+
+    Raises:
+        ConfigError: it is not there and cannot be built, or the system does not load it.
+    """
     ffi = FFI()
     for path in (COMMON, header):
         text = path.read_text(encoding="utf-8")
         ffi.cdef(text.split("/* declarations begin */")[1].split("/* declarations end */")[0])
-    return ffi, ffi.dlopen(str(library()))
+    built = library()
+    try:
+        return ffi, ffi.dlopen(str(built))
+    except OSError as error:  # of another platform, or on a file system that nothing is executed from
+        raise ConfigError(
+            f"the simulator's core cannot be loaded: {error}; expected a library for this machine. Next: remove {built}, "
+            "or name a cache folder in XDG_CACHE_HOME that code is executed from"
+        ) from error
 
 
 def fill(struct: Any, values: Mapping[str, Any]) -> None:

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import ctypes
 import dataclasses
+import os
+import platform
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from bench.errors import ConfigError
 from sim_backend.core import build
+from sim_backend.core import plant as core
 from sim_backend.machines.tsbs import plant
 from sim_backend.machines.tsbs.params import ControlParams, PlantParams
 
@@ -22,6 +27,15 @@ def sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setattr(build, "HERE", tmp_path)
     monkeypatch.setattr(build, "MACHINES", tmp_path / "machines")
     return tmp_path
+
+
+@pytest.fixture
+def cache(sources: Path, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The sources are an installed package's; what is built for the user goes here."""
+    folder = tmp_path_factory.mktemp("cache")
+    monkeypatch.setattr(build, "CLONE", sources / "pyproject.toml")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(folder))
+    return folder / "levbench"
 
 
 def test_built_once_and_again_when_a_header_changes(sources: Path) -> None:
@@ -59,6 +73,75 @@ def test_compiler_output_is_in_the_error(sources: Path) -> None:
     with pytest.raises(ConfigError, match=r"tsbs\.c"):
         build.library()
     assert not list(sources.glob("*.so"))
+
+
+def test_an_installed_package_is_built_for_the_user_and_not_written_into(sources: Path, cache: Path) -> None:
+    before = sorted(sources.rglob("*"))
+    built = build.library()
+    assert built.parent == cache
+    assert sorted(sources.rglob("*")) == before
+    assert cache.stat().st_mode & 0o777 == 0o700
+    stamp = built.stat().st_mtime_ns
+    assert build.library() == built
+    assert built.stat().st_mtime_ns == stamp
+
+
+def test_a_compiled_library_that_was_brought_is_taken(
+    sources: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    brought = build.compile_all(sources)
+    assert len(brought) == (2 if platform.machine() == "x86_64" else 1)
+    monkeypatch.setenv("PATH", "")
+    assert build.library() in brought
+    monkeypatch.setattr(build, "_has_avx2", lambda: False)
+    assert build.library() == brought[0]
+    assert not cache.exists()
+
+
+@pytest.mark.parametrize("mode", [0o720, 0o702, 0o777])
+def test_a_cache_folder_that_others_write_into_is_refused(cache: Path, mode: int) -> None:
+    """What lies there is executed."""
+    cache.mkdir()
+    cache.chmod(mode)
+    with pytest.raises(ConfigError, match=r"that others can write into.*Next: `chmod go-w`"):
+        build.library()
+    assert not list(cache.iterdir())
+
+
+def test_no_folder_to_build_in(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    cache.parent.joinpath("file").touch()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(cache.parent / "file"))
+    with pytest.raises(ConfigError, match=r"no folder to build it in.*XDG_CACHE_HOME"):
+        build.library()
+
+
+@pytest.mark.parametrize("named", ["", "relative/cache"])
+def test_where_the_variable_names_no_absolute_path(
+    cache: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, named: str
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", named)
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    assert build.library().parent == tmp_path / "home/.cache/levbench"
+
+
+def test_processes_that_start_at_once_all_load_it(sources: Path, cache: Path) -> None:
+    """None of them sees half of a library: each builds its own, and one name takes them all."""
+    ask = (
+        "import ctypes, pathlib, sys; from sim_backend.core import build; here = pathlib.Path(sys.argv[1]);"
+        "build.HERE, build.MACHINES, build.CLONE = here, here / 'machines', here / 'pyproject.toml';"
+        "print(ctypes.CDLL(str(build.library())).one())"
+    )
+    started = [subprocess.Popen([sys.executable, "-c", ask, str(sources)], stdout=subprocess.PIPE) for _ in range(4)]
+    assert [process.communicate()[0].strip() for process in started] == [b"1"] * 4
+    assert len(os.listdir(cache)) == 1
+
+
+def test_a_library_that_does_not_load_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    broken = tmp_path / "core.so"
+    broken.write_bytes(b"of another platform")
+    monkeypatch.setattr(core, "library", lambda: broken)
+    with pytest.raises(ConfigError, match=rf"cannot be loaded.*Next: remove {broken}"):
+        core.open_core(Path(plant.__file__).with_name("tsbs.h"))
 
 
 @pytest.mark.parametrize(("kind", "struct"), [(PlantParams, "tsbs_params"), (ControlParams, "tsbs_control")])
