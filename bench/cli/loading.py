@@ -208,6 +208,17 @@ def _foreign(found: Procedure, whose: str, origin: Origin) -> Procedure:
     return replace(found, origin=origin, **calls)
 
 
+def _wrong_defaults(plan: type[BenchPlan]) -> Iterator[str]:
+    """Settings without a default, or with one that the plan itself would refuse."""
+    from pydantic import ValidationError
+
+    try:
+        plan.model_validate(dict(plan()))
+    except ValidationError as error:
+        for e in error.errors(include_url=False):
+            yield f"plan.{'.'.join(map(str, e['loc']))}: found {e['input']!r} as its default; expected another: {e['msg']}"
+
+
 def _wrong(p: Procedure) -> Iterator[str]:
     """What is not of its kind in a procedure."""
     if not isinstance(p.name, str) or not NAME.fullmatch(p.name) or p.name == LISTENED:
@@ -218,6 +229,8 @@ def _wrong(p: Procedure) -> Iterator[str]:
         yield f"state: found {p.state!r}; expected a RigState"
     if not (isinstance(p.plan, type) and issubclass(p.plan, BenchPlan)):
         yield f"plan: found {p.plan!r}; expected a class that is a BenchPlan"
+    else:
+        yield from _wrong_defaults(p.plan)
     calls: Mapping[str, Any] = {n: getattr(p, n) for n in ("acquire", "evaluate", "measured", "figures", "check",
                                                            "requires", "settings", "needs")}  # fmt: skip
     yield from (f"{name}: found {call!r}; expected a function" for name, call in calls.items() if not callable(call))

@@ -74,7 +74,8 @@ def _named(run: RunDirectory, name: str, origin: Origin, command: str) -> str:
         there = False
     if there:
         return f"{made}. Next: `{shlex.join([*words, str(path)])}`"
-    text = f"print(R.open({str(run.recording)!r}).attachment({ATTACHED!r}), end='')"
-    written = f"python -c {shlex.quote(f'from bench.recording import Recording as R; {text}')} > {origin.name}"
+    kept = f"Recording.open(Path({str(run.recording)!r})).attachment({ATTACHED!r})"
+    text = f"from pathlib import Path; from bench.recording import Recording; Path({origin.name!r}).write_text({kept})"
+    written = f"python -c {shlex.quote(text)}"
     return (f"{made}. It is not there as it was then. Next: `{written}` writes what the recording kept of it, then "
             f"`{shlex.join([*words, f'./{origin.name}'])}`, or give today's file")  # fmt: skip
