@@ -12,6 +12,7 @@ properties of the item, provenance those of the suite. `bench.cli.suite` sees to
 
 from __future__ import annotations
 
+import argparse
 import sys
 import tempfile
 import warnings
@@ -65,7 +66,7 @@ def add_options(config: pytest.Config, parser: pytest.Parser) -> None:
         words = {"dest": _dest(name), **settings}
         try:
             group.addoption(f"--{name}", **words)
-        except ValueError:
+        except (ValueError, argparse.ArgumentError):
             taken.append(name)
             group.addoption(f"--{NAME}-{name}", **words)
     config.stash[TAKEN] = tuple(taken)

@@ -11,14 +11,15 @@ from sim_backend.machine import Array, Machine, Numbers, Truth
 
 COIL_OHM = 4.0
 DEFECTS = {"drop_fraction": 0.0, "dead_after_s": 0.0, "fault_after_s": 0.0, "integrator_factor": 1.0,
-           "position_sign": 1.0, "saturation": 0.0}  # fmt: skip
-"""Planted defects and their harmless values. All but the last two are the controller's, which every machine has."""
+           "position_sign": 1.0}  # fmt: skip
+"""Planted defects and their harmless values. All but the last are the controller's, which every machine has."""
 
 
 def stated(rig: RigFile) -> dict[str, Toleranced]:
     """Every toleranced number of a rig file that is drawn, by its name."""
     simulated = {name: rig.simulation[name] for name in ("constant", "zero")}
-    drawn = {"gravity": rig.site.gravity, "mass": rig.machine["mass"], "clearance": rig.geometry["clearance"]}
+    drawn = {"gravity": rig.site.gravity, "clearance": rig.geometry["clearance"]}
+    drawn |= {"mass": rig.machine["mass"], "saturation": rig.machine["own_saturation"]}
     for name, sensor in rig.sensors.items():
         drawn |= {f"{name}.gain": sensor.gain, f"{name}.offset": sensor.offset}
     return drawn | simulated
@@ -36,7 +37,7 @@ def params(v: Numbers, d: Numbers) -> Params:
         position_offset=v["pos_y.offset"],
         current_gain=v["i.gain"],
         current_offset=v["i.offset"],
-        saturation=d["saturation"],
+        saturation=v["saturation"],
     )
 
 

@@ -39,7 +39,7 @@ class Params:
     current_noise: float = 3e-3
     trip_current: float = 5.0
     lost_time: float = 0.02
-    saturation: float = 0.0  # 1/A: the iron's, the pull falls off as 1 / (1 + saturation * i)^2
+    saturation: float = 0.0  # at 1 A, of the iron: the pull falls off as 1 / (1 + saturation * i)^2
 
 
 class Plant:

@@ -46,10 +46,7 @@ class ScpiLine:
     def close(self) -> None:
         """Release it; a request that waits ends."""
         self._closed = True
-        if (open_one := self._socket) is not None:
-            with contextlib.suppress(OSError):
-                open_one.shutdown(socket.SHUT_RDWR)
-            open_one.close()
+        self._hang_up()
 
     def port(self, unit: int) -> ScpiPort:
         """The instrument; `unit` means nothing to it."""
@@ -61,30 +58,36 @@ class ScpiLine:
             with self._lock:
                 return self._asked(question)
         except OSError as error:
-            self._socket = None
+            self._hang_up()
             raise LinkError(f"link {self._name}: {self._url}: no answer to {question!r}: {error}") from error
 
     def _asked(self, question: str) -> str:
         if self._closed:
             raise OSError("closed")
-        if self._socket is None:
-            self._connect()
-            self.stats.reconnects += 1
-        assert self._socket is not None
-        self._socket.sendall(f"{question}\n".encode())
+        there = self._socket or self._connect()
+        there.sendall(f"{question}\n".encode())
         self.stats.sent += 1
         answer = b""
         while not answer.endswith(b"\n"):
-            piece = self._socket.recv(LONGEST)
+            piece = there.recv(LONGEST)
             answer += piece
             if not piece or len(answer) > LONGEST:
                 raise OSError("it hung up" if not piece else f"an answer of more than {LONGEST} bytes")
         self.stats.received += 1
         return answer.decode("ascii", "replace").strip()
 
-    def _connect(self) -> None:
+    def _hang_up(self) -> None:
+        if (lost := self._socket) is not None:
+            with contextlib.suppress(OSError):
+                lost.shutdown(socket.SHUT_RDWR)
+            lost.close()
+        self._socket = None
+
+    def _connect(self) -> socket.socket:
         self._socket = socket.create_connection(self._address, TIMEOUT_S)
-        self._socket.settimeout(TIMEOUT_S)
+        if self.stats.sent:
+            self.stats.reconnects += 1
+        return self._socket
 
 
 @dataclass(frozen=True)
@@ -107,7 +110,7 @@ class ScpiPort:
         text = self.line.ask(f"MEAS:TEMP? (@{number})")
         try:
             high, low = struct.unpack(">HH", struct.pack(">f", float(text)))
-        except ValueError:
+        except (ValueError, OverflowError):
             raise RegisterRefused(ILLEGAL_ADDRESS, f"channel {number}, which answers {text!r}") from None
         return high, low
 
