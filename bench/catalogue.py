@@ -1,4 +1,5 @@
-"""What can be run, and on what: a literal table of procedures, the rig files in `rigs/`, the campaigns in `campaigns/`.
+"""What can be run, and on what: a literal table of procedures and what installed packages add to it, the rig files in `rigs/`,
+the campaigns in `campaigns/`.
 
 Nothing heavy is imported: `bench --help` and `bench list` read this. A test holds the table against the modules.
 """
@@ -6,21 +7,30 @@ Nothing heavy is imported: `bench --help` and `bench list` read this. A test hol
 from __future__ import annotations
 
 import difflib
+import importlib.util
 import tomllib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from bench import extensions
 from bench.errors import ConfigError
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A procedure's name, the module that holds it as `procedure`, and what it does in one line."""
+    """A procedure's name, the module that holds it as `procedure`, and what it does in one line; `point` is how a package
+    registers one that is not ours."""
 
     name: str
     module: str
     about: str
+    point: extensions.Point | None = None
+
+    @property
+    def owner(self) -> str:
+        """Who brings it, for people: distribution and module."""
+        return f"{extensions.OURS} ({self.module})" if self.point is None else self.point.owner
 
 
 def _room(name: str, about: str) -> Entry:
@@ -101,16 +111,61 @@ INSTALLED = shipped("rigs")
 INSTALLED_CAMPAIGNS = shipped("campaigns")
 
 
+def procedures() -> tuple[Entry, ...]:
+    """Ours, then those of installed packages; what is taken twice is left out of these (`taken_twice` says so)."""
+    ours = _ours()
+    added = (p for p in extensions.points(extensions.PROCEDURES) if p.name not in ours)
+    found = {p.name: _added(p) for p in added}
+    twice = {name for name, _ in taken_twice()}
+    return (*PROCEDURES, *(e for name, e in found.items() if name not in twice))
+
+
+def taken_twice() -> tuple[tuple[str, str], ...]:
+    """Names of procedures that have two owners, each with a sentence that names them."""
+    return tuple(extensions.clashes(extensions.PROCEDURES, _ours()))
+
+
+def _ours() -> dict[str, str]:
+    return {p.name: p.module for p in PROCEDURES}
+
+
+def _added(point: extensions.Point) -> Entry:
+    return Entry(point.name, point.module, f"of the package {point.package} {point.version}", point)
+
+
 def entry(name: str) -> Entry:
-    """The table's line of a procedure.
+    """The line of a procedure, ours or an installed package's.
 
     Raises:
-        ConfigError: there is no such procedure.
+        ConfigError: there is no such procedure, or its name is taken twice.
     """
-    for candidate in PROCEDURES:
-        if candidate.name == name:
+    ours = next((p for p in PROCEDURES if p.name == name), None)
+    point = extensions.found(extensions.PROCEDURES, name, ours.module if ours else "")
+    if ours is not None:
+        return ours
+    if point is None:
+        raise ConfigError(_unknown("procedure", name, [p.name for p in procedures()]))
+    return _added(point)
+
+
+def of_file(path: Path) -> Entry | None:
+    """The line of the procedure whose module a file is, if it is one's."""
+    for candidate in procedures():
+        where = file_of(candidate)
+        if where is not None and where.exists() and where.samefile(path):
             return candidate
-    raise ConfigError(_unknown("procedure", name, [p.name for p in PROCEDURES]))
+    return None
+
+
+def file_of(entry: Entry) -> Path | None:
+    """The file of a procedure's module; of a package's, None where it cannot be found."""
+    if entry.point is None:
+        return INSTALLED.parent.joinpath(*entry.module.split(".")).with_suffix(".py")
+    try:
+        spec = importlib.util.find_spec(entry.module)  # imports the packages above it
+    except (Exception, SystemExit):
+        return None
+    return Path(spec.origin) if spec is not None and spec.origin is not None else None
 
 
 def rigs() -> Iterator[RigEntry]:

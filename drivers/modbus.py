@@ -23,6 +23,7 @@ from bench.link import LinkStats
 from bench.rigfile import LinkSpec, RigFile, linkurl
 from bench.rigfile.linkurl import LinkUrl
 from bench.rigfile.registers import RegisterRefused, Table, Words
+from drivers.registerline import RegisterLine, device_kind
 
 TIMEOUT_S = 0.5  # for an answer, and for a connection; option `timeout_s` of the link
 AGAIN_S = 0.1  # between two attempts to open what was lost
@@ -126,19 +127,24 @@ class ModbusLine:
 
 
 @contextmanager
-def open_lines(rig: RigFile) -> Iterator[Mapping[str, ModbusLine]]:
-    """The Modbus links of the rig's register devices by name, connected for the block.
+def open_lines(rig: RigFile) -> Iterator[Mapping[str, RegisterLine]]:
+    """The links of the rig's register devices by name, Modbus or of a kind that a package adds, connected for the block.
 
     Raises:
         ConfigError: a link that is none, or nobody answers there.
     """
     links = dict.fromkeys(d.link for d in rig.devices.values() if d.registers)
     with ExitStack() as stack:
-        lines = {name: ModbusLine(name, rig.links[name]) for name in links}
+        lines = {name: _line(name, rig.links[name]) for name in links}
         for line in lines.values():
             stack.callback(line.close)
             line.open()
         yield lines
+
+
+def _line(name: str, spec: LinkSpec) -> RegisterLine:
+    kind = device_kind(linkurl.parse(spec.url).scheme)
+    return ModbusLine(name, spec) if kind is None else kind.line(name, spec)
 
 
 @dataclass(frozen=True)
@@ -186,7 +192,7 @@ class ModbusPort:
 
 def _client(name: str, url: LinkUrl, timeout_s: float) -> Client:
     if url.scheme not in linkurl.MODBUS_SCHEMES:
-        known = ", ".join(linkurl.EXAMPLES[s] for s in linkurl.MODBUS_SCHEMES)
+        known = ", ".join(map(linkurl.example, linkurl.device_schemes()))
         raise ConfigError(f"link {name}: found {url.scheme}:{url.rest}; expected such as {known}")
     settings = _settings(name, url)
     if url.scheme == "modbus-rtu":

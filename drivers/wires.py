@@ -1,11 +1,16 @@
-"""Wires: open transports, all with the same face. `open_wire` picks one by the scheme of a link's URL."""
+"""Wires: open transports, all with the same face. `open_wire` picks one by the scheme of a link's URL.
+
+A package adds one by the entry point `levbench.links`: its name is the scheme, what it leads to is a `LinkKind`.
+"""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
+from bench import extensions
 from bench.clock import WallClock
 from bench.errors import ConfigError, LinkError
 from bench.link import LinkStats
@@ -183,6 +188,24 @@ class CanWire:
             self._can.close()
 
 
+@dataclass(frozen=True, slots=True)
+class LinkKind:
+    """How a package opens a link of its scheme: of the link's entry in the rig file, its name, the identifiers of the messages
+    that the other end sends, and the rig's clock (UNIX ns), which stamps frames. Raises ConfigError where it cannot be."""
+
+    open: Callable[[LinkSpec, str, Sequence[int], Callable[[], int]], Wire]
+
+
+def link_kind(scheme: str) -> LinkKind | None:
+    """What a package brings for a scheme; None where that is ours, or nobody's.
+
+    Raises:
+        ConfigError: the scheme is taken twice, or cannot be loaded.
+    """
+    point = extensions.found(extensions.LINKS, scheme, linkurl.owner(scheme))
+    return None if point is None else extensions.load(point, LinkKind)
+
+
 def open_wire(
     spec: LinkSpec, name: str, identifiers: Sequence[int] = (), now_ns: Callable[[], int] | None = None,
     rig: RigFile | None = None,
@@ -197,16 +220,20 @@ def open_wire(
         rig: whose table `commandline` says how its messages are said on a command line.
 
     Raises:
-        ConfigError: the URL is none of a controller's link, or the port or interface cannot be opened.
+        ConfigError: the URL is none of a controller's link, its scheme has two owners, or the port or interface cannot be
+            opened.
     """
     clock = now_ns or WallClock().now_ns
     url = linkurl.parse(spec.url)
+    kind = link_kind(url.scheme)
     if url.scheme in ("slcan", "can"):
         return CanWire(open_bus(spec, name, identifiers, clock))
     if url.scheme == "serial":
         return PacketWire(open_port(name, url, BytePort), clock)
     if url.scheme == "cli" and rig is not None:
         return speak(open_port(name, url, BytePort), _baudrate(name, url.query), name, rig, clock)
+    if kind is not None:
+        return kind.open(spec, name, identifiers, clock)
     raise ConfigError(f"link {name}: found {spec.url!r}; expected a URL that starts with slcan:, can:, serial: or cli:")
 
 

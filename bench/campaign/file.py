@@ -135,7 +135,7 @@ def _short(value: Any) -> str:
 
 
 def _unknown_procedures(data: Mapping[str, Any], path: str) -> list[Problem]:
-    known = [p.name for p in catalogue.PROCEDURES]
+    known = [p.name for p in catalogue.procedures()]
     found = data.get("step")
     steps = found if isinstance(found, list) else []
     named = [(n, s["procedure"]) for n, s in enumerate(steps, 1) if isinstance(s, dict) and "procedure" in s]

@@ -96,7 +96,9 @@ def check(
 
 @app.command()
 def run(
-    procedure: Annotated[str, typer.Argument(metavar="PROCEDURE", help="A name that `bench list` shows.")],
+    procedure: Annotated[
+        str, typer.Argument(metavar="PROCEDURE", help="A name that `bench list` shows, or a file that holds one.")
+    ],
     rig: o.RigOption,
     backend: Annotated[o.Backend, typer.Option(help="The simulated rig, or the real one.")] = o.Backend.SIM,
     seed: o.Seed = None,

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from bench import catalogue
-from bench.cli.loading import load_procedure
+from bench.cli.loading import beside, load_procedure, of_entry
 from bench.errors import ConfigError, Lacking, Problem
 from bench.procedure import BenchPlan, Procedure
 from bench.procedure.plans import assemble
@@ -36,13 +36,26 @@ class Ability:
 
 
 def abilities(rig: RigFile, only: str = "") -> list[Ability]:
-    """Of every procedure of the catalogue, or of one.
+    """Of every procedure of the catalogue, or of one, by its name or its file. Where all are asked for, one of a package that
+    cannot be used is told like one that the rig cannot run.
 
     Raises:
-        ConfigError: there is no such procedure.
+        ConfigError: there is no such procedure, or the one that is asked for cannot be used.
     """
-    names = [catalogue.entry(only).name] if only else [entry.name for entry in catalogue.PROCEDURES]
-    return [_ability(rig, load_procedure(name)) for name in names]
+    if only:
+        return [_ability(rig, load_procedure(only))]
+    twice = dict(catalogue.taken_twice())
+    able = [_of_entry(rig, entry) for entry in catalogue.procedures() if entry.name not in twice]
+    return [*able, *(Ability(name, unfit=(why,)) for name, why in twice.items())]
+
+
+def _of_entry(rig: RigFile, entry: catalogue.Entry) -> Ability:
+    if entry.point is None:
+        return _ability(rig, of_entry(entry))
+    try:
+        return _ability(rig, of_entry(entry))
+    except ConfigError as error:
+        return Ability(entry.name, unfit=(str(error),))
 
 
 def _ability(rig: RigFile, procedure: Procedure) -> Ability:
@@ -69,9 +82,9 @@ def _ability(rig: RigFile, procedure: Procedure) -> Ability:
 
 
 def unknown_plans(rig: RigFile) -> Iterator[Problem]:
-    """Tables of default plans that are no procedure's."""
+    """Tables of default plans that are no procedure's, of the catalogue or in a file beside the rig's."""
+    names = [*(entry.name for entry in catalogue.procedures()), *(name for _, name in beside(rig))]
     for name in rig.plans:
-        names = [entry.name for entry in catalogue.PROCEDURES]
         if name not in names:
             close = difflib.get_close_matches(name, names, 1)
             hint = f", such as {close[0]}" if close else ""

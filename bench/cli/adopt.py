@@ -10,24 +10,28 @@ from pathlib import Path
 from bench import catalogue
 from bench.calibration import Calibration
 from bench.calibration.store import Store, named
-from bench.cli.loading import load_procedure
+from bench.cli.made_by import procedure_of
 from bench.record.outcomes import SOUND
 from bench.rigfile import load_rig
 from bench.run.adoption import Adoption, due, refuse_other_rig
 from bench.uncertainty import interval, stated
 
 
-def adopt(run: Path, rig: str = "", calibrations: Path | None = None, anyway: bool = False) -> tuple[Calibration, Path]:
+def adopt(
+    run: Path, rig: str = "", calibrations: Path | None = None, anyway: bool = False, procedure: str = ""
+) -> tuple[Calibration, Path]:  # fmt: skip
     """Make a run's results the current calibration of its rig; what it is now, and its file.
 
-    `rig` is the rig file, by default the one that the run was made with; `calibrations` another folder than the one beside it.
+    `rig` is the rig file, by default the one that the run was made with; `calibrations` another folder than the one beside it;
+    `procedure` the file of a procedure that is in no catalogue.
 
     Raises:
         ConfigError: the run cannot be relied on, or is not of the rig as its file describes it today.
         BenchError: its recording cannot be read or analysed.
     """
     adoption = Adoption.open(run)
-    made = adoption.calibration(load_procedure(adoption.recording.procedure), anyway)
+    chosen = procedure_of(adoption.run, adoption.recording.procedure, procedure, "adopt")
+    made = adoption.calibration(chosen, anyway)
     then = adoption.recording.wall.get("rig_file", "")
     file = load_rig(rig or (then if Path(then).is_file() else str(catalogue.rig_path(made.rig))))
     store = Store.of(file, made.seed, calibrations)
@@ -36,9 +40,9 @@ def adopt(run: Path, rig: str = "", calibrations: Path | None = None, anyway: bo
     return made, store.adopt(made)
 
 
-def adopt_command(run: Path, rig: str, calibrations: Path | None, anyway: bool) -> int:
+def adopt_command(run: Path, rig: str, calibrations: Path | None, anyway: bool, procedure: str = "") -> int:
     """Adopt, say on standard error what became current and until when; the file on standard output."""
-    made, path = adopt(run, rig, calibrations, anyway)
+    made, path = adopt(run, rig, calibrations, anyway, procedure)
     sys.stderr.write(said(made))
     sys.stdout.write(f"{path}\n")
     return 0

@@ -8,12 +8,11 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from bench import catalogue
 from bench.calibration import Calibration, changed_certificates, number
 from bench.calibration import file as calibration_file
 from bench.calibration.store import Store, base_of, machine, stores_of
 from bench.cli.adopt import values
-from bench.cli.loading import load_procedure
+from bench.cli.loading import loadable
 from bench.errors import ConfigError
 from bench.record.outcomes import SOUND
 from bench.rigfile import RigFile, load_rig
@@ -49,7 +48,7 @@ def calibrations_command(rig: str, calibrations: Path | None) -> int:
 
 def first_to_run(rig: RigFile) -> str:
     """The first procedure that the rig can run and whose calibration another one uses there; else the first that it can run."""
-    able = [p for p in map(load_procedure, (e.name for e in catalogue.PROCEDURES)) if not p.lacking(rig)]
+    able = [p for p in loadable() if not p.lacking(rig)]
     used = {need.procedure for p in able for need in p.needs(p.plan())}
     return next((p.name for p in able if p.name in used), able[0].name if able else "")
 

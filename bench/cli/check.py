@@ -23,10 +23,22 @@ def show_list() -> int:
     """Procedures, rigs and campaigns, one a line. Imports nothing heavy."""
     found = [(r.name, r.title) for r in catalogue.rigs()]
     campaigns = [(c.name, c.title) for c in catalogue.campaigns()]
-    _table("procedures", [(p.name, p.about) for p in catalogue.PROCEDURES])
+    _table("procedures", [(p.name, p.about) for p in catalogue.procedures()])
     _table("rigs", found or [("(none found)", "")])
     _table("campaigns", campaigns or [("(none found)", "")])
-    return PASS
+    return _of_packages()
+
+
+def _of_packages() -> int:
+    """Say what is wrong with what installed packages register, as far as their metadata tell; 2 if something is."""
+    from bench import extensions
+
+    others = (extensions.MACHINES, extensions.DEVICES, extensions.LINKS)
+    wrong = [why for _, why in catalogue.taken_twice()]
+    wrong += [why for group in others for _, why in extensions.clashes(group, {})]
+    wrong += extensions.problems()
+    sys.stderr.write("".join(f"bench: {text}\n" for text in wrong))
+    return USAGE if wrong else PASS
 
 
 def show_abilities(rig: str) -> int:
@@ -41,8 +53,19 @@ def show_abilities(rig: str) -> int:
         from bench.rigfile import load_rig
 
         loaded = load_rig(rig)
-        sys.stdout.write(f"procedures on {loaded.name}\n{listed(abilities(loaded), rig)}{sampled.told(loaded)}")
+        sys.stdout.write(f"procedures on {loaded.name}\n{listed(abilities(loaded), rig)}")
+        sys.stdout.write(_in_files(loaded, rig) + sampled.told(loaded))
     return PASS
+
+
+def _in_files(loaded: RigFile, rig: str) -> str:
+    """Procedures in files beside the rig's: named, not executed."""
+    from bench.cli.loading import beside
+
+    found = beside(loaded)
+    lines = [f"  {path}  {name}\n" for path, name in found]
+    head = f"in files beside it, not looked into (`bench check {rig} FILE` does):\n"
+    return "".join([head, *lines]) if found else ""
 
 
 @contextlib.contextmanager
@@ -158,6 +181,11 @@ def _of_simulation(rig: RigFile) -> Iterator[Problem]:
     try:
         yield from unspoken(rig, machine_of(rig))
     except ConfigError as error:
+        if str(error).startswith("machine "):  # a package's
+            yield Problem(
+                rig.path, "simulation.machine", f"{rig.simulation.get('machine')!r}: {error}", "one that can be used"
+            )
+            return
         place, _, said = str(error).partition(": found ")
         found, _, expected = said.partition("; expected ")
         yield Problem(rig.path, place.rpartition(" ")[2], found, expected)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Literal, cast
 
 from bench import rundir
-from bench.cli.loading import load_procedure
+from bench.cli.made_by import procedure_of
 from bench.cli.reporting import figures
-from bench.errors import BenchError, RecordingError
+from bench.errors import BenchError, ConfigError, RecordingError
+from bench.figures import Shown
 from bench.record.records import read_record
 from bench.recording import Recording
 from bench.run.export import Format, Tabular, export, whole_file
@@ -18,7 +20,7 @@ from bench.run.result_tables import products
 Log = Literal["blf", "asc", "candump"]
 
 
-def export_command(run: Path, to: Format | Log) -> int:
+def export_command(run: Path, to: Format | Log, procedure: str = "") -> int:
     """Write a run's streams and events, its results and its figures' data into `RUN/export` and say where; or its raw frames,
     as a log of CAN.
 
@@ -32,7 +34,7 @@ def export_command(run: Path, to: Format | Log) -> int:
     if Recording.open(directory.recording).truncated:
         sys.stderr.write("bench: the recording is truncated: the files hold what was written before it was cut off\n")
     if to in ("parquet", "csv"):
-        _found(directory, folder, to)
+        _found(directory, folder, to, procedure)
     sys.stdout.write(f"{folder}\n")
     return 0
 
@@ -57,15 +59,21 @@ def _logs(directory: rundir.RunDirectory, to: Log) -> Path:
     return folder
 
 
-def _found(directory: rundir.RunDirectory, folder: Path, to: Tabular) -> None:
+def _found(directory: rundir.RunDirectory, folder: Path, to: Tabular, given: str) -> None:
     """Results and figures; a run that was killed has no record, and its streams alone."""
     if not directory.record.exists():
         return
     record = read_record(directory.record)
-    procedure = load_procedure(record.procedure)
-    recording: Recording[Any] = Recording.open(directory.recording, procedure.plan)
+    shown: Iterable[Shown] = ()
     try:
-        for _ in products(folder, to, record.measurements, figures(record, procedure, recording)):
+        procedure = procedure_of(directory, record.procedure, given, "export")
+        shown = figures(record, procedure, Recording.open(directory.recording, procedure.plan))
+    except ConfigError as error:
+        if given:
+            raise
+        sys.stderr.write(f"bench: figures are left out: {error}\n")
+    try:
+        for _ in products(folder, to, record.measurements, shown):
             pass
     except OSError as error:
         raise BenchError(f"{folder}: cannot be written: {error.strerror or error}; the run is untouched") from error

@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from drivers.controller import Controller
     from drivers.fieldbus import Fieldbus
     from drivers.live_link import LiveLink
-    from drivers.modbus import ModbusLine
     from drivers.operator import LineOperator
+    from drivers.registerline import RegisterLine
     from sim_backend.machine import Truth
 
 logger = logging.getLogger("bench.opening")
@@ -116,8 +116,8 @@ def live(
     fault_injection.divided(injected, simulated=False)
     spec = rig.link
     scheme = linkurl.parse(spec.url).scheme
-    if scheme not in linkurl.CONTROLLER_SCHEMES[1:]:
-        known = ", ".join(linkurl.EXAMPLES[s] for s in linkurl.CONTROLLER_SCHEMES[1:])
+    if scheme not in (able := linkurl.controller_schemes()[1:]):
+        known = ", ".join(map(linkurl.example, able))
         raise ConfigError(f"link {rig.devices['controller'].link}: found {spec.url!r}; expected such as {known}")
 
     @contextmanager
@@ -243,7 +243,7 @@ def _operators(
 
 def _opened(
     controller: Controller, base: WatchedClock, bus: Fieldbus, operators: Sequence[Any], truth: Mapping[str, Any] | None,
-    injected: Sequence[Fault], lines: Mapping[str, ModbusLine] = MappingProxyType({}),
+    injected: Sequence[Fault], lines: Mapping[str, RegisterLine] = MappingProxyType({}),
 ) -> OpenRig:  # fmt: skip
     recording: list[Any] = [controller, bus, *operators]
     controller.companions.append(bus.pump)

@@ -51,6 +51,12 @@ Calibrations = Annotated[
 Verbose = Annotated[
     bool, typer.Option("--verbose", "-v", help="Say every result and every note, not only what was judged.")
 ]
+ProcedureFile = Annotated[
+    str,
+    typer.Option(
+        "--procedure", metavar="FILE", help="The file of the procedure, if the run was made by one in a file."
+    ),
+]
 RunArgument = Annotated[Path, typer.Argument(metavar="RUN", help="A run directory.")]
 RigArgument = Annotated[str, typer.Argument(metavar="RIG", help="A rig file, or its name in rigs/.")]
 RigOption = Annotated[str, typer.Option("--rig", metavar="RIG", help="A rig file, or its name in rigs/.")]

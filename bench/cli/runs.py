@@ -10,7 +10,7 @@ from typing import Any
 
 from bench import rundir, runlog
 from bench.cli import reporting
-from bench.cli.loading import load_procedure
+from bench.cli.made_by import procedure_of
 from bench.cli.run import STATUS
 from bench.cli.summary import summary
 from bench.errors import BenchError, ConfigError, RecordingError
@@ -27,20 +27,20 @@ def _line(text: str) -> None:
     sys.stderr.write(text + "\n")
 
 
-def analyse_command(run: Path, whole: bool = False) -> int:
+def analyse_command(run: Path, whole: bool = False, procedure: str = "") -> int:
     """Analyse again; the verdict's exit status, the analysis directory on standard output."""
     with Supervisor().watching(), runlog.to_lines(_line):
-        result = reanalysis.analyse(run, load_procedure)
+        result = reanalysis.analyse(run, lambda name: procedure_of(rundir.existing(run), name, procedure))
     sys.stderr.write(summary(result.record, result.directory, whole=whole, width=columns()))
     sys.stdout.write(f"{result.directory}\n")
     return STATUS[result.outcome]
 
 
-def report_command(run: Path) -> int:
+def report_command(run: Path, given: str = "") -> int:
     """Build the report again from the stored record and recording."""
     directory = rundir.existing(run)
     record = read_record(directory.record)
-    procedure = load_procedure(record.procedure)
+    procedure = procedure_of(directory, record.procedure, given, "report")
     recording: Recording[Any] | None = None
     with Supervisor().watching(), runlog.to_lines(_line):
         try:

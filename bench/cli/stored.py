@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from bench.cli.options import Calibrations, Out, RunArgument, Table, Verbose
+from bench.cli.options import Calibrations, Out, ProcedureFile, RunArgument, Table, Verbose
 
 
 def adopt(
@@ -17,6 +17,7 @@ def adopt(
     anyway: Annotated[
         bool, typer.Option("--anyway", help="Also a run that is neither PASS nor DONE; the file says so.")
     ] = False,
+    procedure: ProcedureFile = "",
 ) -> int:
     """Make a run's results the rig's current calibration.
 
@@ -24,7 +25,7 @@ def adopt(
     """
     from bench.cli.adopt import adopt_command
 
-    return adopt_command(run, rig, calibrations, anyway)
+    return adopt_command(run, rig, calibrations, anyway, procedure)
 
 
 def calibrations(
@@ -37,21 +38,21 @@ def calibrations(
     return calibrations_command(rig, calibrations)
 
 
-def analyse(run: RunArgument, verbose: Verbose = False) -> int:
+def analyse(run: RunArgument, verbose: Verbose = False, procedure: ProcedureFile = "") -> int:
     """Analyse a stored run again, from its recording alone.
 
     Writes RUN/analyses/<UTC>/record.json; the original stays as it is.
     """
     from bench.cli.runs import analyse_command
 
-    return analyse_command(run, verbose)
+    return analyse_command(run, verbose, procedure)
 
 
-def report(run: RunArgument) -> int:
+def report(run: RunArgument, procedure: ProcedureFile = "") -> int:
     """Build the report of a stored run again."""
     from bench.cli.runs import report_command
 
-    return report_command(run)
+    return report_command(run, procedure)
 
 
 def runs(out: Out = Path("runs")) -> int:
@@ -62,7 +63,9 @@ def runs(out: Out = Path("runs")) -> int:
 
 
 def export(
-    run: RunArgument, to: Annotated[Table, typer.Option("--to", help="File format of the tables.")] = Table.PARQUET
+    run: RunArgument,
+    to: Annotated[Table, typer.Option("--to", help="File format of the tables.")] = Table.PARQUET,
+    procedure: ProcedureFile = "",
 ) -> int:
     """Write the channels, results and figures of a run as tables.
 
@@ -70,4 +73,4 @@ def export(
     """
     from bench.cli.export import export_command
 
-    return export_command(run, to.value)
+    return export_command(run, to.value, procedure)

@@ -10,12 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from bench import catalogue
 from bench.calibration import Need, settings_differ
 from bench.calibration.store import Store, machine
 from bench.cli.adopt import adopt
 from bench.cli.compose import Request, assignments_of, planned
-from bench.cli.loading import load_procedure
+from bench.cli.loading import known, load_procedure
 from bench.cli.run import execute
 from bench.errors import BenchError, ConfigError
 from bench.procedure import Procedure
@@ -145,8 +144,7 @@ def by_procedure(assignments: Sequence[str], rig: str) -> dict[str, tuple[str, .
         setting = rest if given else text
         key, _ = assignment(setting)
         if not given and not able:
-            able = {e.name: load_procedure(e.name) for e in catalogue.PROCEDURES}
-            able = {n: p for n, p in able.items() if not p.lacking(load_rig(rig))}
+            able = {p.name: p for p in known() if not p.lacking(load_rig(rig))}
         procedures = {given: load_procedure(given)} if given else able
         suited = [n for n, p in procedures.items() if _has(key, tuple(p.plan.model_fields))]
         if not suited:

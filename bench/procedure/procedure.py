@@ -13,6 +13,7 @@ from bench.figures import Shown
 from bench.findings import Ended, Finding, Findings
 from bench.plan import BenchPlan
 from bench.procedure.names import by_names_of, quantities_on
+from bench.procedure.origin import Origin
 from bench.procedure.requires import Requires
 from bench.procedure.roles import RigState
 from bench.quantity import Measured, Quantity
@@ -145,6 +146,7 @@ class Procedure:
     places: tuple[str, ...] = ()
     kinds: tuple[Quantity, ...] = ()
     method: str = ""  # the report's section: plain paragraphs, parted by empty lines
+    origin: Origin | None = None  # of one that is none of ours: whoever loads it says so
 
     def refuse_by(self, rig: RigFile, plan: Any, calibrations: Iterable[Calibration]) -> None:
         """Raises Unfit if the plan cannot work by what is known of the rig; `calibrations` are those that it needs."""

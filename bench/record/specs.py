@@ -130,7 +130,7 @@ def misnamed(rig_name: str, folders: Collection[Path] | None = None, *, file: Pa
         ConfigError: the file cannot be used.
     """
     path, found = _read(rig_name, folders, file)
-    names = [entry.name for entry in catalogue.PROCEDURES]
+    names = [entry.name for entry in catalogue.procedures()]
     for name in found:
         if name not in names and (close := difflib.get_close_matches(name, names, 1)):
             yield Problem(str(path), f"limits.{name}", name, f"the name of a procedure, such as {close[0]}")

@@ -105,10 +105,10 @@ def _devices(rig: RigFile) -> Iterator[Problem]:
 
 
 def _schemes(rig: RigFile, device: str) -> tuple[str, ...]:
-    """URL schemes that a device can be on: the controller, the operator's line; the others' are Modbus."""
+    """URL schemes that a device can be on: the controller, the operator's line, register devices."""
     if device == "controller":
-        return linkurl.CONTROLLER_SCHEMES
-    return ("line",) if "operator" in rig.devices[device].roles else linkurl.MODBUS_SCHEMES
+        return linkurl.controller_schemes()
+    return ("line",) if "operator" in rig.devices[device].roles else linkurl.device_schemes()
 
 
 def _links(rig: RigFile) -> Iterator[Problem]:
@@ -125,7 +125,7 @@ def _links(rig: RigFile) -> Iterator[Problem]:
         for device in (n for n, d in rig.devices.items() if d.link == name):
             fit = _schemes(rig, device)
             if url.scheme not in fit:
-                such = ", ".join(linkurl.EXAMPLES[x] for x in fit)
+                such = ", ".join(linkurl.example(x) for x in fit)
                 yield Problem(rig.path, f"{key}.url", link.url, f"a URL for the {device}, such as {such}")
         stated = link.bitrate is not None or "bitrate" in {**url.query, **link.options}
         if url.scheme in ("slcan", "can") and not stated:

@@ -43,6 +43,8 @@ MACHINE = {"pole_pairs": "1", "polar_inertia": "kg m^2", "ring_inertia": "kg m^2
            "weight_mass": "kg", "weight_angle": "rad", "drive_drag": "N m",
            "segment_gain": "1", "torque_ripple": "N m/A", "resistance": "Ohm", "rotor_poles": "1", "ring_mass": "kg",
            "added_mass": "kg", "added_mass_inertia": "kg m^2"}  # fmt: skip
+OWN = "own_"
+"""What the name of a number begins with that a procedure or machine from outside the repository asks for."""
 
 
 def problems_of(rig: RigFile) -> Iterator[Problem]:
@@ -58,14 +60,17 @@ def problems_of(rig: RigFile) -> Iterator[Problem]:
     used = references_in(rig) | {f"machine/{name}" for step in stepped for name in step.stated}
     used |= {one.period for one in rig.capabilities.force_currents.values()}
     for key in sorted(rig.machine.keys() - MACHINE.keys()):
-        if f"machine/{key}" not in used:
-            yield Problem(rig.path, f"machine.{key}", "a number nobody asks for", f"one of {', '.join(MACHINE)}")
+        if f"machine/{key}" not in used and not key.startswith(OWN):
+            expected = f"one of {', '.join(MACHINE)}, or {OWN}{key} for a procedure of your own"
+            yield Problem(rig.path, f"machine.{key}", "a number nobody asks for", expected)
     known = GEOMETRY | SHAFT_GEOMETRY | HOOK_GEOMETRY | MOTOR_GEOMETRY | SOME_GEOMETRY
     for key in sorted(g.keys() - known.keys()):
-        if f"geometry/{key}" not in used:
+        if f"geometry/{key}" not in used and not key.startswith(OWN):
             close = difflib.get_close_matches(key, known, 1)
-            yield Problem(rig.path, f"geometry.{key}", "a length nobody asks for",
-                          f"did you mean {close[0]}?" if close else "no such key")  # fmt: skip
+            expected = (
+                f"did you mean {close[0]}?" if close else f"no such key, or {OWN}{key} for a procedure of your own"
+            )
+            yield Problem(rig.path, f"geometry.{key}", "a length nobody asks for", expected)
     yield from _lengths(rig)
     yield from _identities(rig)
     if (

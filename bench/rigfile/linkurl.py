@@ -10,7 +10,8 @@
     modbus-rtu-tcp:HOST:PORT                RTU frames over TCP
     line:HOST:PORT                          the operator's line protocol
 
-PORT is a device (`/dev/ttyACM0`, `COM3`), `socket://HOST:PORT` or `rfc2217://HOST:PORT`.
+PORT is a device (`/dev/ttyACM0`, `COM3`), `socket://HOST:PORT` or `rfc2217://HOST:PORT`. Installed packages may add schemes
+(`drivers.wires`, `drivers.registerline`).
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import re
 from dataclasses import dataclass, field
 from urllib.parse import parse_qsl
 
+from bench import extensions
 from bench.errors import ConfigError
 
 EXAMPLES = {
@@ -38,6 +40,26 @@ TCP_SCHEMES = ("modbus-tcp", "modbus-rtu-tcp", "line")
 PIECES_SCHEMES = ("serial", "cli")
 """Links on which a capture comes in pieces; on the others it comes in blocks of ISO 15765-2."""
 MODBUS_SCHEMES = ("modbus-tcp", "modbus-rtu", "modbus-rtu-tcp")
+
+
+def owner(scheme: str) -> str:
+    """What of ours holds a scheme; "" where it is none of ours."""
+    return "bench.rigfile.linkurl" if scheme in EXAMPLES else ""
+
+
+def controller_schemes() -> tuple[str, ...]:
+    """Those of a controller's link, with what packages add."""
+    return (*CONTROLLER_SCHEMES, *extensions.names(extensions.LINKS, EXAMPLES))
+
+
+def device_schemes() -> tuple[str, ...]:
+    """Those of lines with register devices, with what packages add."""
+    return (*MODBUS_SCHEMES, *extensions.names(extensions.DEVICES, EXAMPLES))
+
+
+def example(scheme: str) -> str:
+    """A URL of a scheme, for messages."""
+    return EXAMPLES.get(scheme, f"{scheme}:ADDRESS")
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,11 +93,11 @@ def parse(url: str) -> LinkUrl:
     """
     scheme, colon, rest = url.partition(":")
     scheme = scheme.lower()
-    if not colon or scheme not in EXAMPLES:
+    if not colon or (scheme not in EXAMPLES and scheme not in (*controller_schemes(), *device_schemes())):
         close = difflib.get_close_matches(scheme, EXAMPLES, 1)
         known = f"did you mean {EXAMPLES[close[0]]!r}?" if close else f"expected one of {', '.join(EXAMPLES)}"
         raise ConfigError(f"link URL {url!r}: found scheme {scheme!r}; {known}")
     where, _, query = rest.partition("?")
     if not where and scheme != "inprocess":
-        raise ConfigError(f"link URL {url!r}: found no address; expected such as {EXAMPLES[scheme]!r}")
+        raise ConfigError(f"link URL {url!r}: found no address; expected such as {example(scheme)!r}")
     return LinkUrl(scheme, where, dict(parse_qsl(query, keep_blank_values=True)))

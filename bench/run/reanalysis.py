@@ -56,7 +56,7 @@ def reanalysed(run: RunDirectory, procedure: Procedure, recording: Recording[Any
     record = unfinished(
         run_id=wall.get("run_id") or run.run_id, procedure=procedure.name, rig=recording.rig.name,
         uut=recording.rig.uut.model_dump(), started=wall.get("started") or (original.started if original else ""),
-        seed=recording.seed, visit=recording.visit or 0, plan=recording.plan_dict, versions=versions(),
+        seed=recording.seed, visit=recording.visit or 0, plan=recording.plan_dict, versions=versions(procedure, recording.rig),
         calibrations=recording.calibrations,
     )  # fmt: skip
     ended = wall.get("ended") or (original.ended if original else None) or record.started

@@ -86,7 +86,7 @@ def run(
             which = "" if job.seed is None else f", seed {job.seed}, visit {job.visit}"
             logger.info("run %s on rig %s, backend %s%s", directory.run_id, job.rig.name, job.backend, which)
             progress.stage(f"{job.procedure.name} on {job.rig.name} ({job.backend}), run {directory.run_id}")
-            wall = partial(provenance.wall, directory, started, job.rig.path)
+            wall = partial(provenance.wall, directory, started, job.rig.path, job.procedure.origin)
             machine = acquired(job, directory.recording, live, supervisor, progress, wall=wall)
         release()  # a disk that is full by now still takes the record
         with progress.busy("analyse"):
@@ -121,7 +121,7 @@ def _unfinished(job: Job, directory: RunDirectory, started: datetime) -> Record:
     return unfinished(
         run_id=directory.run_id, procedure=job.procedure.name, rig=job.rig.name, uut=job.rig.uut.model_dump(),
         started=started.isoformat(timespec="seconds"), seed=job.seed, visit=job.visit, plan=job.plan.model_dump(mode="json"),
-        versions=provenance.versions(), calibrations=job.calibrations,
+        versions=provenance.versions(job.procedure, job.rig), calibrations=job.calibrations,
     )  # fmt: skip
 
 
