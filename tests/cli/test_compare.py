@@ -84,7 +84,9 @@ def test_the_difference_on_the_terminal_fits_it(tmp_path: Path, bench: Bench) ->
     assert max(map(len, out.splitlines())) <= 80
     assert "amb-calibration: B - A" in out
     assert "plan angles: 1, then 2" in out
-    assert "72.00 ± 0.35" in out  # u = sqrt(0.1^2 + 0.144^2) = 0.1753, 8 (0.1753/0.1)^4 = 75 degrees of freedom, k = 1.99
+    assert (
+        "72.00 ± 0.35" in out
+    )  # u = sqrt(0.1^2 + 0.144^2) = 0.1753, 8 (0.1753/0.1)^4 = 75 degrees of freedom, k = 1.99
     # By hand: u_d = sqrt(2 x 0.1^2 + 0.004^2) = 0.1415, 16 degrees of freedom, k = 2.12: U = 0.300.
     assert "2.00 ± 0.30" in out
     assert "6.67" in out
