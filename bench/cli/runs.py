@@ -18,6 +18,7 @@ from bench.run.indexrow import IndexEntry, Result
 
 Shown = dict[str, dict[str, Result]]
 """Results by name and run."""
+FEW = 1000  # runs whose results are looked for one by one
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,7 @@ def runs_command(request: RunsRequest) -> int:
         found = index.entries(
             out, procedure=request.procedure, rig=request.rig, failed=request.failed, last=request.last
         )
-        shown = _shown(request)
+        shown = _shown(request, found)
     except (sqlite3.Error, OSError) as error:
         raise BenchError(f"{out / index.NAME}: the index cannot be used: {error}") from error
     if request.as_json:
@@ -61,29 +62,24 @@ def runs_command(request: RunsRequest) -> int:
     return 0
 
 
-def _shown(request: RunsRequest) -> Shown:
+def _shown(request: RunsRequest, found: Sequence[IndexEntry]) -> Shown:
     """The results that are to be shown. One word may mean several names: a kind, all that is measured of it.
 
     Raises:
         ConfigError: no run has measured it.
     """
     out: Shown = {}
+    few = [e.run_id for e in found] if len(found) <= FEW else None
     for word in request.show:
-        found = index.results(
-            request.out,
-            quantity=word,
-            procedure=request.procedure,
-            rig=request.rig,
-            failed=request.failed,
-            last=request.last,
-        )
-        if not found and word not in (known := index.names(request.out)):
+        results = index.results(request.out, quantity=word, of=few)
+        if not results and not index.results(request.out, quantity=word, last=1):
+            known = index.names(request.out)
             near = difflib.get_close_matches(word, known, 3) or known[:8]
             raise ConfigError(
                 f"--show {word}: found no run in {request.out} that has measured it; expected a quantity of a record, such as "
                 f"{', '.join(near) or 'K_i'}"
             )
-        for result in found:
+        for result in results:
             out.setdefault(result.name, {})[result.run_id] = result
     return out
 

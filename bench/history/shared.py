@@ -52,7 +52,8 @@ def same_machine(a: Record, b: Record) -> bool:
     with another seed, and never the real one."""
     if (a.seed, _served(a)) != (b.seed, _served(b)):
         return False
-    return dict(a.uut) == dict(b.uut) if a.uut.get("serial") and b.uut.get("serial") else a.rig == b.rig
+    one, other = ((r.uut.get("model"), r.uut.get("serial")) for r in (a, b))
+    return one == other if one[1] and other[1] else a.rig == b.rig
 
 
 def _served(record: Record) -> bool:
