@@ -1,54 +1,57 @@
-"""An index of the runs in a directory, `index.sqlite`. The records are the truth; the index can always be rebuilt."""
+"""An index of the runs in a directory and of their results, `index.sqlite`. The records are the truth; the index can always be
+rebuilt. What only reads it imports nothing heavy: `bench.run.indexed` reads the records."""
 
 from __future__ import annotations
 
+import gc
+import json
 import logging
+import os
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import astuple, dataclass, fields
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
+from typing import Any, TypeVar
 
 from bench.errors import ConfigError
-from bench.findings import SIMULATED_CONTROLLER
-from bench.record.records import read_record
+from bench.run.indexrow import IndexEntry, Result, Row
 from bench.rundir import RunDirectory, runs_in
 
 NAME = "index.sqlite"
-VERSION = 3  # of the table; another one is rebuilt
+VERSION = 4  # of the tables; another one is rebuilt
+SOUND = ("PASS", "DONE")
+T = TypeVar("T")
 log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, slots=True)
-class IndexEntry:
-    """One run, as `bench runs` lists it."""
-
-    run_id: str
-    procedure: str
-    rig: str
-    outcome: str
-    started: str
-    ended: str | None
-    seed: int | None
-    visit: int | None
-    served: bool  # live, on a controller that says that it is a simulated one
-
-
-_COLUMNS = ", ".join(f.name for f in fields(IndexEntry))
-_INSERT = f"INSERT OR REPLACE INTO runs ({_COLUMNS}) VALUES ({', '.join('?' * len(fields(IndexEntry)))})"
+RUN_COLUMNS = ", ".join(IndexEntry._fields)
+CALLED = "name, full, quantity, place, unit"
+TABLES = f"""
+    CREATE TABLE runs (run INTEGER PRIMARY KEY, {RUN_COLUMNS}, settings, parameters, firmware, certificates, calibrations,
+                       UNIQUE (run_id));
+    CREATE INDEX runs_by_time ON runs (started, run_id);
+    CREATE TABLE names (number INTEGER PRIMARY KEY, {CALLED}, UNIQUE ({CALLED}));
+    CREATE TABLE results (number INTEGER, run INTEGER, ordinal INTEGER, value, u, expanded, dof, p, lower, upper, verdict,
+                          PRIMARY KEY (number, run, ordinal)) WITHOUT ROWID;
+    CREATE INDEX results_by_run ON results (run);
+"""
+"""Results lie together by name, and refer to runs by number: so a series of very many is read in a fraction of a second."""
+_READ = """r.run_id, procedure, rig, uut, started, seed, visit, outcome, name, quantity, place, unit, value, u, expanded, dof,
+    p, lower, upper, verdict, settings, firmware, calibrations, parameters, certificates, served"""
 
 
 def add(run_dir: Path) -> None:
-    """Put a run into the index of the directory that holds it, or bring its line up to date.
+    """Put a run into the index of the directory that holds it, or bring its lines up to date.
 
     Raises:
         ConfigError: it holds no readable record.
     """
-    entry = _entry(RunDirectory(run_dir.resolve()))
-    root = run_dir.resolve().parent
-    _sound(root)
-    with _opened(root) as db:
-        db.execute(_INSERT, astuple(entry))
+    from bench.run.indexed import row
+
+    found = row(RunDirectory(run_dir.resolve()))
+    _answered(run_dir.resolve().parent, lambda db: _put(db, found))
 
 
 def rebuild(root: Path) -> list[str]:
@@ -62,52 +65,157 @@ def rebuild(root: Path) -> list[str]:
         return _filled(root)
 
 
-def entries(root: Path) -> list[IndexEntry]:
-    """The runs in `root`, oldest first, without those deleted since; rebuilds a missing or corrupt index."""
+def entries(
+    root: Path, *, procedure: str | None = None, rig: str | None = None, failed: bool = False, last: int | None = None
+) -> list[IndexEntry]:
+    """The runs in `root`, oldest first, without those deleted since; rebuilds a missing or corrupt index.
+
+    `failed` are those that ended neither PASS nor DONE; `last` the newest so many of what is left by the others."""
     if not root.is_dir():
         return []
-    _sound(root)
-    with _opened(root) as db:
-        rows = db.execute(f"SELECT {_COLUMNS} FROM runs ORDER BY started, run_id").fetchall()
-    return [entry for row in rows if (root / (entry := IndexEntry(*row)).run_id).is_dir()]
+    where, values = _chosen(procedure, rig, failed)
+    query = f"SELECT {RUN_COLUMNS} FROM runs r {where} ORDER BY started {{0}}, r.run_id {{0}}"
+    with _uncollected():
+        return [IndexEntry._make(row) for row in _answered(root, lambda db: _there(db, root, query, values, last))]
 
 
-def _entry(run: RunDirectory) -> IndexEntry:
-    record = read_record(run.record)
-    # The directory's name, not the record's: a copied directory is another run to whoever looks for it.
-    return IndexEntry(run.run_id, record.procedure, record.rig, record.outcome.value, record.started, record.ended,
-                      record.seed, record.visit, any(f.code == SIMULATED_CONTROLLER for f in record.findings))  # fmt: skip
+def results(
+    root: Path, *, quantity: str | None = None, procedure: str | None = None, rig: str | None = None, failed: bool = False,
+    last: int | None = None, of: Sequence[str] | None = None,
+) -> list[Result]:  # fmt: skip
+    """Results of the runs in `root`, oldest run first, in the record's order within a run; those deleted since left out.
+
+    Args:
+        quantity: a name of the record (`K_i`, `B@by the speed channel`), or by kind and place (`K@inboard`); a kind alone is
+            all that is measured of it, where nothing has that very name.
+        last: the newest so many runs that have any.
+        of: the names of some runs: of these alone.
+    """
+    if not root.is_dir():
+        return []
+    where, values = _chosen(procedure, rig, failed, of)
+    # The newest few are found by going back through the runs, all of a series where they lie together.
+    tables = "runs r CROSS JOIN results s ON s.run = r.run" if last or of else "results s JOIN runs r USING (run)"
+
+    def asked(db: sqlite3.Connection) -> list[tuple[Any, ...]]:
+        named = "" if quantity is None else f" AND s.number IN ({', '.join(map(str, _meant(db, quantity)))})"
+        query = (f"SELECT {_READ} FROM {tables} JOIN names n ON n.number = s.number {where or 'WHERE 1'}{named} "
+                 "ORDER BY started {0}, r.run_id {0}, ordinal {0}")  # fmt: skip
+        return _there(db, root, query, values, last if of is None else len(of))
+
+    with _uncollected():
+        return [Result._make((*row, root)) for row in _answered(root, asked)]
 
 
-def _sound(root: Path) -> None:
-    """See to it that there is an index that can be used."""
-    try:
-        with _opened(root) as db:
-            version = db.execute("PRAGMA user_version").fetchone()[0]
-            whole = version == VERSION and db.execute("PRAGMA quick_check(1)").fetchone()[0] == "ok"
-    except sqlite3.OperationalError:
-        raise
-    except sqlite3.DatabaseError:
-        whole = False
-    if not whole:
+def names(root: Path) -> list[str]:
+    """The names that results have in `root`, and what they are called by kind and place, in order."""
+    if not root.is_dir():
+        return []
+    query = "SELECT name FROM names UNION SELECT full FROM names ORDER BY 1"
+    return _answered(root, lambda db: [str(name) for (name,) in db.execute(query)])
+
+
+def _meant(db: sqlite3.Connection, asked: str) -> list[int]:
+    """The numbers of the names of results that somebody means by a word."""
+    for column in ("full", "quantity"):
+        query = f"SELECT number FROM names WHERE name IN (SELECT name FROM names WHERE name = ?1 OR {column} = ?1)"
+        if found := [number for (number,) in db.execute(query, (asked,))]:
+            return found
+    return []
+
+
+def _chosen(
+    procedure: str | None, rig: str | None, failed: bool, of: Sequence[str] | None = None
+) -> tuple[str, tuple[str, ...]]:
+    """The condition of a query for runs, with its values."""
+    asked = {"procedure = ?": procedure, "rig = ?": rig}
+    conditions = [text for text, value in asked.items() if value is not None]
+    values = tuple(v for v in asked.values() if v is not None)
+    conditions += [f"outcome NOT IN {SOUND}"] if failed else []
+    if of is not None:
+        conditions.append("r.run_id IN (SELECT value FROM json_each(?))")
+        values = (*values, json.dumps(list(of)))
+    return f"WHERE {' AND '.join(conditions)}" if conditions else "", values
+
+
+def _there(
+    db: sqlite3.Connection, root: Path, query: str, values: tuple[str, ...], last: int | None
+) -> list[tuple[Any, ...]]:
+    """Rows of runs that are still there, oldest first; of so many runs at most. `query` has `{0}` for the order. One listing of
+    the folder is quicker than to look for each of very many runs, and slower than to look for a few."""
+    if last is None:
+        present = set(os.listdir(root))
+        return [row for row in db.execute(query.format("ASC"), values) if row[0] in present]
+    kept: list[list[tuple[Any, ...]]] = []
+    for run_id, rows in groupby(db.execute(query.format("DESC"), values), key=itemgetter(0)):
+        if (root / run_id).is_dir():
+            kept.append(list(rows))
+            if len(kept) == last:
+                break
+    return [row for rows in reversed(kept) for row in reversed(rows)]
+
+
+def _answered(root: Path, ask: Callable[[sqlite3.Connection], T]) -> T:
+    """What the index answers. One that is missing, of another version or corrupt is rebuilt first: that shows where it is read,
+    as a check of the whole would take longer than any answer."""
+    for _ in range(2):
+        try:
+            with _opened(root) as db:
+                if db.execute("PRAGMA user_version").fetchone()[0] == VERSION:
+                    return ask(db)
+        except sqlite3.OperationalError:
+            raise
+        except sqlite3.DatabaseError:
+            pass
         rebuild(root)
+    with _opened(root) as db:
+        return ask(db)
 
 
 def _filled(root: Path) -> list[str]:
+    from bench.run.indexed import row
+
     messages: list[str] = []
     with _opened(root) as db:
         db.execute("BEGIN IMMEDIATE")  # before the records are read: another process adds before or after, not between
-        db.execute("DROP TABLE IF EXISTS runs")
-        db.execute(f"CREATE TABLE runs ({_COLUMNS}, PRIMARY KEY (run_id))")
+        for table in ("runs", "names", "results"):
+            db.execute(f"DROP TABLE IF EXISTS {table}")
+        for statement in filter(str.strip, TABLES.split(";")):
+            db.execute(statement)
         for run in runs_in(root):
             try:
-                db.execute(_INSERT, astuple(_entry(run)))
+                _put(db, row(run))
             except ConfigError as error:
                 messages.append(f"{run.path}: left out of the index: {error}")
         db.execute(f"PRAGMA user_version = {VERSION}")
     for message in messages:
         log.warning(message)
     return messages
+
+
+def _put(db: sqlite3.Connection, row: Row) -> None:
+    """A run and its results, in place of what stood there of that run."""
+    for (run,) in db.execute("SELECT run FROM runs WHERE run_id = ?", row.entry[:1]).fetchall():
+        db.execute("DELETE FROM results WHERE run = ?", (run,))
+        db.execute("DELETE FROM runs WHERE run = ?", (run,))
+    of_run = (None, *row.entry, *row.made_with)
+    run = db.execute(f"INSERT INTO runs VALUES ({', '.join('?' * len(of_run))})", of_run).lastrowid
+    for ordinal, (called, numbers) in enumerate(row.results):
+        known = db.execute(f"SELECT number FROM names WHERE ({CALLED}) = (?, ?, ?, ?, ?)", called).fetchone()
+        number = known[0] if known else db.execute("INSERT INTO names VALUES (NULL, ?, ?, ?, ?, ?)", called).lastrowid
+        db.execute("INSERT INTO results VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", (number, run, ordinal, *numbers))
+
+
+@contextmanager
+def _uncollected() -> Iterator[None]:
+    """Rows are tuples of numbers and texts: to look among very many of them for circles takes longer than to read them."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
 
 
 @contextmanager
