@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import shutil
 import sqlite3
 from contextlib import closing
@@ -13,9 +14,13 @@ import pytest
 from bench.cli.runs import runs_command
 from bench.errors import ConfigError
 from bench.findings import SIMULATED_CONTROLLER, Finding
+from bench.quantity import Quantity
+from bench.record.limits import Limit
 from bench.record.outcomes import Outcome
-from bench.record.records import findings_of, read_record, unfinished, write_record
+from bench.record.records import findings_of, measurement, read_record, unfinished, write_record
+from bench.record.setup import Certified, Setup
 from bench.run import index
+from bench.uncertainty import Estimate, Influence
 
 
 def run(root: Path, second: int, outcome: Outcome = Outcome.PASS) -> Path:
@@ -89,3 +94,82 @@ def test_deleted_runs_are_not_listed(tmp_path: Path) -> None:
     shutil.rmtree(run(tmp_path, 1))
     assert outcomes(tmp_path) == []
     assert index.entries(tmp_path / "nothing") == []
+
+
+def measuring(
+    root: Path, second: int, value: float, *, setup: Setup | None = None, plan: int = 9, rig: str = "tsbs12"
+) -> Path:
+    """A run that measured K_i, and B at one place beside another."""
+    path = run(root, second)
+    estimate = Estimate.of(value, Influence("scatter/1", "scatter", 0.1, "N/A", "A", "normal", 20.0))
+    force, drag = Quantity("K_i", "N/A", "force constant"), Quantity("B", "N/A", "drag")
+    made = [
+        measurement(force.measured(estimate), Limit(70.0, None, "N/A", "design", True)),
+        measurement(drag.measured(estimate), None),
+        measurement(drag.measured(estimate, "by the channel"), None),
+    ]
+    record = read_record(path / "record.json")
+    write_record(path / "record.json", dataclasses.replace(record, measurements=tuple(made), rig=rig, setup=setup,
+                                                           plan={"angles": plan, "rounds": None}))  # fmt: skip
+    index.add(path)
+    return path
+
+
+def setup_with(bias: float = 3.0, gain: float = 1.0) -> Setup:
+    return Setup("ab" * 32, "protocol 1", {"bias_i": bias}, {"K_i": "K@inboard"},
+                 {"sensors/i/gain": Certified(gain, 1e-3, "1", "rectangular", "SIM-1")})  # fmt: skip
+
+
+def test_results_are_those_of_the_records(tmp_path: Path) -> None:
+    paths = [measuring(tmp_path, second, 70.0 + second) for second in (2, 1, 3)]
+    found = index.results(tmp_path, quantity="K_i")
+    assert [(r.value, r.path) for r in found] == [(71.0, paths[1]), (72.0, paths[0]), (73.0, paths[2])]
+    first = found[0]
+    assert (first.lower, first.upper, first.verdict, first.p) == (70.0, None, "pass", 0.95)
+    assert (first.u, first.dof, first.unit) == (0.1, 20.0, "N/A")
+    assert first.U is not None
+    assert abs(first.U - 0.2086) < 1e-5  # t of 20 degrees of freedom: GUM table G.2
+    assert [r.value for r in index.results(tmp_path, quantity="K_i", last=2)] == [72.0, 73.0]
+    shutil.rmtree(paths[2])
+    assert [r.value for r in index.results(tmp_path, quantity="K_i", last=2)] == [71.0, 72.0]
+
+
+def test_a_name_means_itself_before_all_that_is_of_its_kind(tmp_path: Path) -> None:
+    measuring(tmp_path, 1, 71.0)  # by a record that does not say what the rig calls things
+    measuring(tmp_path, 2, 72.0, setup=setup_with())
+    assert [r.name for r in index.results(tmp_path, quantity="B")] == ["B", "B"]
+    assert [r.where for r in index.results(tmp_path, quantity="B@by the channel")] == ["by the channel"] * 2
+    for asked in ("K_i", "K@inboard", "K"):
+        assert [r.value for r in index.results(tmp_path, quantity=asked)] == [71.0, 72.0]
+    newer = index.results(tmp_path, quantity="K_i")[1]
+    assert (newer.name, newer.quantity, newer.where) == ("K_i", "K", "inboard")
+    assert index.results(tmp_path, quantity="Q") == []
+
+
+def test_runs_and_results_by_procedure_rig_and_outcome(tmp_path: Path) -> None:
+    measuring(tmp_path, 1, 71.0)
+    measuring(tmp_path, 2, 72.0, rig="other")
+    index.add(run(tmp_path, 3, Outcome.ABORTED))
+    assert [r.value for r in index.results(tmp_path, quantity="K_i", rig="other")] == [72.0]
+    assert [e.outcome for e in index.entries(tmp_path, failed=True)] == ["ABORTED"]
+    assert [e.rig for e in index.entries(tmp_path, rig="other", procedure="amb-calibration")] == ["other"]
+    assert index.entries(tmp_path, procedure="step") == []
+    assert [e.started[-3:] for e in index.entries(tmp_path, last=2)] == ["02Z", "03Z"]
+
+
+def test_what_makes_another_series_is_told_apart(tmp_path: Path) -> None:
+    measuring(tmp_path, 1, 71.0)
+    for second, (setup, plan) in enumerate(((setup_with(), 9), (setup_with(2.0), 9), (setup_with(2.0, 1.1), 8)), 2):
+        measuring(tmp_path, second, 71.0, setup=setup, plan=plan)
+    found = index.results(tmp_path, quantity="K_i")
+    changed = [now.changed(before) for before, now in itertools.pairwise(found)]
+    assert changed == [(), ("parameters",), ("plan", "certificates")]  # what the oldest does not say has not changed
+
+
+def test_damage_within_the_index_is_seen_where_it_is_read(tmp_path: Path) -> None:
+    for second in range(60):
+        measuring(tmp_path, second, 71.0)
+    whole = (tmp_path / index.NAME).read_bytes()
+    (tmp_path / index.NAME).write_bytes(whole[:4096] + b"\xff" * (len(whole) - 4096))
+    assert len(index.results(tmp_path, quantity="K_i")) == 60
+    assert len(index.entries(tmp_path)) == 60

@@ -167,7 +167,7 @@ def change(*keys: str | int, to: Any) -> str:
         ("[1]", "no schema"),
         ("{}", "no schema"),
         ('{"schema": 1}', "run_id"),
-        (change("schema", to=3), "newer"),
+        (change("schema", to=4), "newer"),
         (change("schema", to=0), "schema: found 0"),
         (change("schema", to=True), "no schema"),
         (change("extra", to=1), "extra"),
@@ -266,3 +266,14 @@ def test_a_failed_replacement_leaves_nothing_behind(tmp_path: Path) -> None:
     with pytest.raises(OSError, match="directory"):
         write_record(tmp_path / "record.json", start())
     assert [p.name for p in tmp_path.iterdir()] == ["record.json"]
+
+
+def test_a_record_of_schema_2_is_read_as_it_stands(tmp_path: Path) -> None:
+    """It does not say what the run was set up with."""
+    content = json.loads(to_json(full())) | {"schema": 2}
+    del content["setup"]
+    path = tmp_path / "record.json"
+    path.write_text(json.dumps(content))
+    old = read_record(path)
+    assert (old.schema, old.setup, old.measurements) == (2, None, full().measurements)
+    jsonschema.validate(content, json.loads(SCHEMA_FILE.read_text()))

@@ -20,12 +20,13 @@ from bench.link.counts import LinkCounts
 from bench.quantity import Measured, Quantity
 from bench.record.limits import Limit, Verdict, judge
 from bench.record.outcomes import Outcome
+from bench.record.setup import Setup
 from bench.schema import STRICT, require_schema
 from bench.uncertainty import PROBABILITY, Estimate, Interval, budget, correlation_matrix, interval
 from bench.wholefile import write_whole
 
-SCHEMA = 2
-"""2: outcome DONE, findings with `concerns`. Records of schema 1 are read as they stand."""
+SCHEMA: Literal[3] = 3
+"""2: outcome DONE, findings with `concerns`. 3: `setup`. Older records are read as they stand."""
 SCHEMA_FILE = Path(__file__).with_name("record.schema.json")
 
 
@@ -131,10 +132,10 @@ class Correlations:
 @dataclass(frozen=True)
 class Record:
     """`record.json`. Times are ISO 8601 UTC; `seed` and `visit` are None for a real rig; `plan` is in SI. Older records of
-    virtual rigs do not say the visit, which was 0."""
+    virtual rigs do not say the visit, which was 0, and those before schema 3 no `setup`."""
 
     __pydantic_config__: ClassVar[ConfigDict] = STRICT
-    schema: Literal[1, 2]
+    schema: Literal[1, 2, 3]
     run_id: str
     procedure: str
     rig: str
@@ -144,6 +145,7 @@ class Record:
     ended: str | None
     seed: int | None
     visit: int | None = field(default=None, kw_only=True)
+    setup: Setup | None = field(default=None, kw_only=True)
     plan: Mapping[str, Any]
     calibrations: tuple[Used, ...]
     versions: Mapping[str, str]
@@ -213,13 +215,14 @@ def read_record(path: Path) -> Record:
 def unfinished(
     *, run_id: str, procedure: str, rig: str, uut: Mapping[str, Any], started: str, seed: int | None,
     plan: Mapping[str, Any], versions: Mapping[str, str], calibrations: Sequence[Calibration] = (), visit: int = 0,
+    setup: Setup | None = None,
 ) -> Record:  # fmt: skip
     """What is written before anything moves: if the run dies, this is what it says."""
     text = "The run did not end: its process was killed, lost power or could write nothing any more."
     said = Finding("unfinished", text, "", Effect.ERROR)
     return Record(
-        schema=2, run_id=run_id, procedure=procedure, rig=rig, uut=uut, outcome=Outcome.ERROR, started=started,
-        ended=None, seed=seed, visit=None if seed is None else visit, plan=plan,
+        schema=SCHEMA, run_id=run_id, procedure=procedure, rig=rig, uut=uut, outcome=Outcome.ERROR, started=started,
+        ended=None, seed=seed, visit=None if seed is None else visit, plan=plan, setup=setup,
         calibrations=tuple(c.summary for c in calibrations), versions=versions, recording=None, link=LinkCounts(),
         findings=findings_of([said]), measurements=(), correlations=Correlations((), ()),
     )  # fmt: skip

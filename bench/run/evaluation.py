@@ -29,6 +29,7 @@ from bench.record.records import (
     measurement,
     missing,
 )
+from bench.record.setup import Certified, certified_of
 from bench.record.specs import applied, in_unit
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
@@ -85,6 +86,7 @@ class Evaluation:
     measurements: tuple[Measurement, ...]
     correlations: Correlations
     findings: tuple[Finding, ...]
+    certified: Mapping[str, Certified] = field(default_factory=dict)
 
     def finish(self, record: Record, ending: Ending, ended: str, recording: RecordingFile | None) -> Record:
         """An unfinished record with its end; the outcome follows from what it holds."""
@@ -95,6 +97,7 @@ class Evaluation:
         return replace(
             record, ended=ended, recording=recording, link=ending.link, findings=findings_of(findings),
             measurements=self.measurements, correlations=self.correlations,
+            setup=None if record.setup is None else replace(record.setup, certified=self.certified),
             outcome=outcome_of(self.measurements, findings, ending.stopped),
         )  # fmt: skip
 
@@ -141,7 +144,8 @@ def evaluate(
     measurements = _in_order(procedure, entries, limits)
     if recording.verdict_required and (nothing := unjudged(measurements, len(stated))) is not None:
         findings.append(nothing)
-    return Evaluation(measurements, correlations, tuple(findings))
+    certified = certified_of(recording.rig, (e.influence for m in measurements for e in m.budget))
+    return Evaluation(measurements, correlations, tuple(findings), certified)
 
 
 def yielded(procedure: Procedure, recording: Recording[Any]) -> Iterator[Measured | Finding]:

@@ -1,54 +1,52 @@
-"""An index of the runs in a directory, `index.sqlite`. The records are the truth; the index can always be rebuilt."""
+"""An index of the runs in a directory and of their results, `index.sqlite`. The records are the truth; the index can always be
+rebuilt. What only reads it imports nothing heavy: `bench.run.indexed` reads the records."""
 
 from __future__ import annotations
 
 import logging
+import os
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import astuple, dataclass, fields
 from pathlib import Path
+from typing import TypeVar
 
 from bench.errors import ConfigError
-from bench.findings import SIMULATED_CONTROLLER
-from bench.record.records import read_record
+from bench.run.indexrow import IndexEntry, Result
 from bench.rundir import RunDirectory, runs_in
 
 NAME = "index.sqlite"
-VERSION = 3  # of the table; another one is rebuilt
+VERSION = 4  # of the tables; another one is rebuilt
+SOUND = ("PASS", "DONE")
+T = TypeVar("T")
 log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, slots=True)
-class IndexEntry:
-    """One run, as `bench runs` lists it."""
-
-    run_id: str
-    procedure: str
-    rig: str
-    outcome: str
-    started: str
-    ended: str | None
-    seed: int | None
-    visit: int | None
-    served: bool  # live, on a controller that says that it is a simulated one
-
-
-_COLUMNS = ", ".join(f.name for f in fields(IndexEntry))
-_INSERT = f"INSERT OR REPLACE INTO runs ({_COLUMNS}) VALUES ({', '.join('?' * len(fields(IndexEntry)))})"
+RUN_COLUMNS = ", ".join(IndexEntry._fields)
+RESULT_COLUMNS = "run_id, ordinal, name, full, quantity, place, unit, value, u, expanded, dof, p, lower, upper, verdict"
+TABLES = f"""
+    CREATE TABLE runs ({RUN_COLUMNS}, PRIMARY KEY (run_id)) WITHOUT ROWID;
+    CREATE INDEX runs_by_time ON runs (started, run_id);
+    CREATE TABLE results ({RESULT_COLUMNS}, PRIMARY KEY (run_id, ordinal)) WITHOUT ROWID;
+    CREATE INDEX results_by_name ON results (name);
+    CREATE INDEX results_by_full ON results (full, name);
+    CREATE INDEX results_by_quantity ON results (quantity, name);
+"""
+_READ = """r.run_id, procedure, rig, uut, started, seed, visit, outcome, name, quantity, place, unit, value, u, expanded, dof,
+    p, lower, upper, verdict, settings, firmware, calibrations, parameters, certificates, served"""
+_NEWEST = "ORDER BY started DESC, r.run_id DESC"
 
 
 def add(run_dir: Path) -> None:
-    """Put a run into the index of the directory that holds it, or bring its line up to date.
+    """Put a run into the index of the directory that holds it, or bring its lines up to date.
 
     Raises:
         ConfigError: it holds no readable record.
     """
-    entry = _entry(RunDirectory(run_dir.resolve()))
-    root = run_dir.resolve().parent
-    _sound(root)
-    with _opened(root) as db:
-        db.execute(_INSERT, astuple(entry))
+    from bench.run.indexed import rows
+
+    found = rows(RunDirectory(run_dir.resolve()))
+    _answered(run_dir.resolve().parent, lambda db: _put(db, *found))
 
 
 def rebuild(root: Path) -> list[str]:
@@ -62,52 +60,140 @@ def rebuild(root: Path) -> list[str]:
         return _filled(root)
 
 
-def entries(root: Path) -> list[IndexEntry]:
-    """The runs in `root`, oldest first, without those deleted since; rebuilds a missing or corrupt index."""
+def entries(
+    root: Path, *, procedure: str | None = None, rig: str | None = None, failed: bool = False, last: int | None = None
+) -> list[IndexEntry]:
+    """The runs in `root`, oldest first, without those deleted since; rebuilds a missing or corrupt index.
+
+    `failed` are those that ended neither PASS nor DONE; `last` the newest so many of what is left by the others."""
     if not root.is_dir():
         return []
-    _sound(root)
-    with _opened(root) as db:
-        rows = db.execute(f"SELECT {_COLUMNS} FROM runs ORDER BY started, run_id").fetchall()
-    return [entry for row in rows if (root / (entry := IndexEntry(*row)).run_id).is_dir()]
+    where, values = _chosen(procedure, rig, failed)
+    query = f"SELECT {RUN_COLUMNS} FROM runs r {where} {_NEWEST}"
+    return _answered(root, lambda db: _newest(root, map(IndexEntry._make, db.execute(query, values)), last))
 
 
-def _entry(run: RunDirectory) -> IndexEntry:
-    record = read_record(run.record)
-    # The directory's name, not the record's: a copied directory is another run to whoever looks for it.
-    return IndexEntry(run.run_id, record.procedure, record.rig, record.outcome.value, record.started, record.ended,
-                      record.seed, record.visit, any(f.code == SIMULATED_CONTROLLER for f in record.findings))  # fmt: skip
+def results(
+    root: Path, *, quantity: str | None = None, procedure: str | None = None, rig: str | None = None, failed: bool = False,
+    last: int | None = None,
+) -> list[Result]:  # fmt: skip
+    """Results of the runs in `root`, oldest run first, in the record's order within a run; those deleted since left out.
+
+    Args:
+        quantity: a name of the record (`K_i`, `B@by the speed channel`), or by kind and place (`K@inboard`); a kind alone is
+            all that is measured of it, where nothing has that very name.
+        last: the newest so many runs.
+    """
+    if not root.is_dir():
+        return []
+
+    def asked(db: sqlite3.Connection) -> list[Result]:
+        where, values = _chosen(procedure, rig, failed)
+        if quantity is not None:
+            meant = _names(db, quantity)
+            where = f"{where or 'WHERE 1'} AND name IN ({', '.join('?' * len(meant))})"
+            values = (*values, *meant)
+        query = f"SELECT {_READ} FROM results JOIN runs r USING (run_id) {where} {_NEWEST}, ordinal DESC"
+        return _newest(root, (Result._make((*row, root)) for row in db.execute(query, values)), last)
+
+    return _answered(root, asked)
 
 
-def _sound(root: Path) -> None:
-    """See to it that there is an index that can be used."""
-    try:
-        with _opened(root) as db:
-            version = db.execute("PRAGMA user_version").fetchone()[0]
-            whole = version == VERSION and db.execute("PRAGMA quick_check(1)").fetchone()[0] == "ok"
-    except sqlite3.OperationalError:
-        raise
-    except sqlite3.DatabaseError:
-        whole = False
-    if not whole:
+def names(root: Path) -> list[str]:
+    """The names that results have in `root`, and what they are called by kind and place, in order."""
+    if not root.is_dir():
+        return []
+    query = "SELECT DISTINCT name FROM results UNION SELECT DISTINCT full FROM results ORDER BY 1"
+    return _answered(root, lambda db: [str(name) for (name,) in db.execute(query)])
+
+
+def _names(db: sqlite3.Connection, asked: str) -> tuple[str, ...]:
+    """The names of results that somebody means by a word."""
+    for column in ("full", "quantity"):
+        query = f"SELECT DISTINCT name FROM results WHERE name = ?1 OR {column} = ?1"
+        if found := tuple(name for (name,) in db.execute(query, (asked,))):
+            return found
+    return (asked,)
+
+
+def _chosen(procedure: str | None, rig: str | None, failed: bool) -> tuple[str, tuple[str, ...]]:
+    """The condition of a query for runs, with its values."""
+    asked = {"procedure = ?": procedure, "rig = ?": rig}
+    conditions = [text for text, value in asked.items() if value is not None]
+    conditions += [f"outcome NOT IN {SOUND}"] if failed else []
+    return f"WHERE {' AND '.join(conditions)}" if conditions else "", tuple(v for v in asked.values() if v is not None)
+
+
+def _newest(root: Path, newest_first: Iterator[T], last: int | None) -> list[T]:
+    """Rows of runs that are still there, oldest first; of so many runs at most. One listing of the folder is quicker than to
+    look for each of very many runs, and slower than to look for a few."""
+    there = _in_folder(root) if last is None else _each_looked_for(root)
+    out: list[T] = []
+    run_id, runs = "", 0
+    for row in newest_first:
+        if row[0] != run_id:  # type: ignore[index]
+            run_id = row[0]  # type: ignore[index]
+            present = there(run_id)
+            if present and (runs := runs + 1) == (last or 0) + 1 and last is not None:
+                break
+        if present:
+            out.append(row)
+    return out[::-1]
+
+
+def _in_folder(root: Path) -> Callable[[str], bool]:
+    with os.scandir(root) as listed:
+        return {entry.name for entry in listed if entry.is_dir()}.__contains__
+
+
+def _each_looked_for(root: Path) -> Callable[[str], bool]:
+    return lambda run_id: (root / run_id).is_dir()
+
+
+def _answered(root: Path, ask: Callable[[sqlite3.Connection], T]) -> T:
+    """What the index answers. One that is missing, of another version or corrupt is rebuilt first: that shows where it is read,
+    as a check of the whole would take longer than any answer."""
+    for _ in range(2):
+        try:
+            with _opened(root) as db:
+                if db.execute("PRAGMA user_version").fetchone()[0] == VERSION:
+                    return ask(db)
+        except sqlite3.OperationalError:
+            raise
+        except sqlite3.DatabaseError:
+            pass
         rebuild(root)
+    with _opened(root) as db:
+        return ask(db)
 
 
 def _filled(root: Path) -> list[str]:
+    from bench.run.indexed import rows
+
     messages: list[str] = []
     with _opened(root) as db:
         db.execute("BEGIN IMMEDIATE")  # before the records are read: another process adds before or after, not between
-        db.execute("DROP TABLE IF EXISTS runs")
-        db.execute(f"CREATE TABLE runs ({_COLUMNS}, PRIMARY KEY (run_id))")
+        for table in ("runs", "results"):
+            db.execute(f"DROP TABLE IF EXISTS {table}")
+        for statement in filter(str.strip, TABLES.split(";")):
+            db.execute(statement)
         for run in runs_in(root):
             try:
-                db.execute(_INSERT, astuple(_entry(run)))
+                _put(db, *rows(run))
             except ConfigError as error:
                 messages.append(f"{run.path}: left out of the index: {error}")
         db.execute(f"PRAGMA user_version = {VERSION}")
     for message in messages:
         log.warning(message)
     return messages
+
+
+def _put(db: sqlite3.Connection, entry: IndexEntry, found: Sequence[tuple[object, ...]]) -> None:
+    """A run and its results, in place of what stood there of that run."""
+    db.execute(f"INSERT OR REPLACE INTO runs ({RUN_COLUMNS}) VALUES ({', '.join('?' * len(entry))})", entry)
+    db.execute("DELETE FROM results WHERE run_id = ?", (entry.run_id,))
+    places = ", ".join("?" * (RESULT_COLUMNS.count(",") + 1))
+    db.executemany(f"INSERT INTO results ({RESULT_COLUMNS}) VALUES ({places})", found)
 
 
 @contextmanager

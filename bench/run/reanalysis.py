@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from bench import rundir
-from bench.errors import ConfigError, RecordingError
+from bench.errors import BenchError, ConfigError, RecordingError
 from bench.procedure import Procedure
 from bench.record.limits import Limit
 from bench.record.records import Record, RecordingFile, read_record, unfinished, write_record
+from bench.record.setup import Setup, setup_of
 from bench.recording import Recording
 from bench.run.evaluation import Ending, evaluate
 from bench.run.provenance import versions
@@ -57,11 +58,19 @@ def reanalysed(run: RunDirectory, procedure: Procedure, recording: Recording[Any
         run_id=wall.get("run_id") or run.run_id, procedure=procedure.name, rig=recording.rig.name,
         uut=recording.rig.uut.model_dump(), started=wall.get("started") or (original.started if original else ""),
         seed=recording.seed, visit=recording.visit or 0, plan=recording.plan_dict, versions=versions(),
-        calibrations=recording.calibrations,
+        calibrations=recording.calibrations, setup=_setup(procedure, recording),
     )  # fmt: skip
     ended = wall.get("ended") or (original.ended if original else None) or record.started
     file = RecordingFile(run.recording.name, recording.digest())
     return evaluation.finish(record, ending, ended, file)
+
+
+def _setup(procedure: Procedure, recording: Recording[Any]) -> Setup | None:
+    """None where this version's procedure cannot tell what it would set on that rig: its analysis then says why."""
+    try:
+        return setup_of(recording.rig, procedure.settings(recording.rig, recording.plan))
+    except (BenchError, LookupError):
+        return None
 
 
 def _limits(recording: Recording[Any]) -> dict[str, Limit]:

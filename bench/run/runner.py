@@ -24,6 +24,7 @@ from bench.procedure import Procedure
 from bench.progress import Progress
 from bench.record.outcomes import Outcome, outcome_of
 from bench.record.records import Record, RecordingFile, findings_of, unfinished, write_record
+from bench.record.setup import setup_of
 from bench.recording import Recording
 from bench.recording.reserve import reserved
 from bench.run import index, provenance
@@ -122,6 +123,7 @@ def _unfinished(job: Job, directory: RunDirectory, started: datetime) -> Record:
         run_id=directory.run_id, procedure=job.procedure.name, rig=job.rig.name, uut=job.rig.uut.model_dump(),
         started=started.isoformat(timespec="seconds"), seed=job.seed, visit=job.visit, plan=job.plan.model_dump(mode="json"),
         versions=provenance.versions(), calibrations=job.calibrations,
+        setup=setup_of(job.rig, job.procedure.settings(job.rig, job.plan)),
     )  # fmt: skip
 
 

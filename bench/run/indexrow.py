@@ -1,0 +1,82 @@
+"""Rows of the index of runs: tuples with names, as they are read by the hundred thousand."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+
+class IndexEntry(NamedTuple):
+    """One run, as `bench runs` lists it. What makes runs comparable is kept as digests (`Result.changed`)."""
+
+    run_id: str
+    procedure: str
+    rig: str
+    outcome: str
+    started: str
+    ended: str | None
+    seed: int | None
+    visit: int | None
+    served: bool  # live, on a controller that says that it is a simulated one
+    uut: str
+    settings: str
+    parameters: str
+    firmware: str
+    certificates: str
+    calibrations: str
+
+
+class Result(NamedTuple):
+    """One measured quantity of one run. `name` is that of the record, with its place where that is not in it (`K_i`, or
+    `K@inboard` on a rig without an own name); `quantity` and `where` are kind and place.
+
+    Value, u, U and the limits are in `unit`; None is missing, an infinite dof, or an open limit. `settings` is a digest of the
+    plan, `parameters` of those of the controller (bias currents, gains), `certificates` of what the rig file says of the
+    numbers that the run's results rest on, `calibrations` of the runs adopted that it used; `firmware` is a text.
+    Each is "" where the record does not say it.
+    """
+
+    run_id: str
+    procedure: str
+    rig: str
+    uut: str
+    started: str
+    seed: int | None
+    visit: int | None
+    outcome: str
+    name: str
+    quantity: str
+    where: str
+    unit: str
+    value: float | None
+    u: float | None
+    U: float | None
+    dof: float | None
+    p: float
+    lower: float | None
+    upper: float | None
+    verdict: str
+    settings: str
+    firmware: str
+    calibrations: str
+    parameters: str
+    certificates: str
+    served: bool
+    root: Path
+
+    @property
+    def path(self) -> Path:
+        """The run directory."""
+        return self.root / self.run_id
+
+    def changed(self, before: Result) -> tuple[str, ...]:
+        """What makes another series of measurements of it than `before` was: none of them is drawn as one line. What one of the
+        two does not say is taken as it was."""
+        both = {
+            "plan": (self.settings, before.settings),
+            "parameters": (self.parameters, before.parameters),
+            "firmware": (self.firmware, before.firmware),
+            "certificates": (self.certificates, before.certificates),
+        }
+        found = [name for name, (now, then) in both.items() if now and then and now != then]
+        return (*found, *(("calibrations",) if self.calibrations != before.calibrations else ()))
