@@ -141,7 +141,15 @@ def campaign(
     return campaign_command(asked)
 
 
-for of_stored_runs in (stored.adopt, stored.calibrations, stored.analyse, stored.report, stored.runs, stored.export):
+for of_stored_runs in (
+    stored.adopt,
+    stored.calibrations,
+    stored.analyse,
+    stored.report,
+    stored.runs,
+    stored.trend,
+    stored.export,
+):
     app.command()(of_stored_runs)
 
 

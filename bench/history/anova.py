@@ -39,15 +39,17 @@ class Anova:
 
 
 def one_way(groups: Sequence[Array]) -> Anova:
-    """Analysis of groups (n_k,) of values, taken about the mean of all first: NIST StRD, whose SiRstv and SmLs sets are the tests,
-    shows what digits in common do to sums of squares.
+    """Analysis of groups (n_k,) of values, taken about the mean of all first, as digits in common spoil sums of squares. NIST
+    StRD, one-way analysis of variance, whose SiRstv and SmLs sets are the tests.
 
     Raises:
         ValueError: fewer than two groups, an empty one, or no more values than groups.
     """
     count = sum(g.size for g in groups)
     if len(groups) < 2 or any(g.size == 0 for g in groups) or count <= len(groups):
-        raise ValueError(f"found {count} values in {len(groups)} groups; expected two groups or more, and more values than groups")
+        raise ValueError(
+            f"found {count} values in {len(groups)} groups; expected two groups or more, and more values than groups"
+        )
     middle = math.fsum(float(x) for g in groups for x in g) / count
     near = [g - middle for g in groups]
     means = [math.fsum(g) / g.size for g in near]

@@ -60,7 +60,8 @@ def ewma(values: Array, weight: float, start: float) -> Array:
 def ewma_sigmas(weight: float, count: int) -> Array:
     """Standard deviations (count,) of z_1, z_2, … over that of a value:
     sqrt(weight / (2 - weight) (1 - (1 - weight)^2i)) (Lucas and Saccucci, Technometrics 32, 1 (1990), eq. 2)."""
-    return np.sqrt(weight / (2 - weight) * (1 - (1 - weight) ** (2.0 * np.arange(1, count + 1))))
+    steps = np.arange(1, count + 1, dtype=np.float64)
+    return ewma_settled(weight) * np.sqrt(1 - (1 - weight) ** (2 * steps))
 
 
 def ewma_settled(weight: float) -> float:

@@ -20,8 +20,8 @@ FEWEST = 3  # values: one more than the line has parameters
 
 @dataclass(frozen=True, slots=True)
 class Drift:
-    """A line fitted to n values: `slope` per unit of time, `level` at `middle`, the values' mean time; `scatter` is the standard
-    deviation about it with `dof` = n - 2 degrees of freedom, `spread` the sum of squares of the times about `middle`."""
+    """A line fitted to n values: `slope` per unit of time, `level` at `middle`, the values' mean time; `scatter` is their
+    standard deviation about it, `dof` its n - 2 degrees of freedom, `spread` the sum of squares of the times about `middle`."""
 
     slope: float
     level: float
@@ -49,14 +49,14 @@ class Drift:
         return self.level + self.slope * (time - self.middle)
 
     def band(self, time: float, common: float = 0.0) -> float:
-        """Half width of the 95 % band of the line at a time: t s sqrt(1/n + (time - mean)^2 / sum (t_i - mean)^2), and in root of
-        the sum of squares `common`, by which all values may be off together."""
+        """Half width of the 95 % band of the line at a time: t s sqrt(1/n + (time - mean)^2 / sum (t_i - mean)^2), and in root
+        of the sum of squares `common`, by which all values may be off together."""
         own = t_factor(self.dof) * self.scatter
         return math.sqrt(own**2 * (1 / self.count + (time - self.middle) ** 2 / self.spread) + common**2)
 
     def reaches(self, limit: float, upward: bool, after: float, common: float = 0.0) -> float | None:
-        """The first time from `after` on at which the band's upper end (`upward`) or lower end reaches `limit`; None if it never
-        does. The line's distance d(T) = limit - at(T) equals the band's half width where d^2 - band^2 = 0, a quadratic."""
+        """The first time from `after` on at which the band's upper end (`upward`) or lower end reaches `limit`; None if it
+        never does. The distance d(T) = limit - at(T) equals the band's half width where d^2 - band^2 = 0, a quadratic."""
         sign = 1.0 if upward else -1.0
 
         def room(time: float) -> float:

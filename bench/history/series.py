@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Literal
 from bench.errors import ConfigError
 
 if TYPE_CHECKING:
-    from bench.run.index import Result
+    from bench.run.indexrow import Result
 
 LISTED = 6  # of what there is, in a message
 BROKEN = ("ERROR", "ABORTED")  # outcomes of which values are not taken
@@ -46,14 +46,18 @@ def one_history(found: Sequence[Result], quantity: str, known: Callable[[], Sequ
     units = {(r.procedure, r.unit) for r in found}
     if len({unit for _, unit in units}) > 1:
         listed = "; ".join(f"{unit} by {procedure}" for procedure, unit in sorted(units))
-        raise ConfigError(f"trend of {quantity}: found different units: {listed}; expected one. Next: add --procedure NAME")
+        raise ConfigError(
+            f"trend of {quantity}: found different units: {listed}; expected one. Next: add --procedure NAME"
+        )
     _require_one("procedure", (r.procedure for r in found), f"trend of {quantity}", "Next: add --procedure {}")
-    _require_one("machine", map(machine, found), f"trend of {quantity}", "Next: add --rig NAME, or --seed N of a virtual one")
+    _require_one(
+        "machine", map(machine, found), f"trend of {quantity}", "Next: add --rig NAME, or --seed N of a virtual one"
+    )
     whole = [r for r in found if r.value is not None and r.outcome not in BROKEN]
     once = _each_once(whole)
     if len(once) < 2:
-        raise ConfigError(f"trend of {quantity}: found {_counted(len(once), 'run')} with a value in {place}; expected 2 or more. "
-                          "Next: run the procedure again, or `bench runs` to see what is there")  # fmt: skip
+        raise ConfigError(f"trend of {quantity}: found {_counted(len(once), 'run')} with a value in {place}; expected 2 or "
+                          "more. Next: run the procedure again, or `bench runs` to see what is there")  # fmt: skip
     by_visit = once[0].seed is not None and len({r.visit for r in once}) == len(once)
     timed = sorted((float(r.visit or 0) if by_visit else days(r.started), k) for k, r in enumerate(once))
     return History(tuple(once[k] for _, k in timed), tuple(t for t, _ in timed), "visit" if by_visit else "date",
@@ -92,9 +96,12 @@ def _require_one(what: str, values: Iterable[str], where: str, then: str) -> Non
 
 def _nothing(quantity: str, known: Sequence[str], place: str) -> str:
     if not known:
-        return f"trend of {quantity}: found no results in {place}; expected a folder of runs. Next: name it with --out DIR"
+        return (
+            f"trend of {quantity}: found no results in {place}; expected a folder of runs. Next: name it with --out DIR"
+        )
     if quantity in known:
-        return f"trend of {quantity}: found no such result of this rig and procedure in {place}. Next: leave --rig or --procedure out"
+        options = "--rig, --procedure or --seed"
+        return f"trend of {quantity}: found no such result in {place} by {options}; expected some. Next: leave them out"
     folded = {name.casefold(): name for name in reversed(known)}
     near = [folded[n] for n in difflib.get_close_matches(quantity.casefold(), folded, LISTED, cutoff=0.5)]
     told = f"the nearest names are {', '.join(near)}" if near else f"there are {', '.join(known[:LISTED])}"

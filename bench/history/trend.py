@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -21,12 +22,14 @@ from bench.history.drift import Drift, chi2_ratio, fitted, t_factor
 from bench.history.series import History
 
 if TYPE_CHECKING:
-    from bench.run.index import Result
+    from bench.run.indexrow import Result
 
 BASELINE = 8  # runs from which there are limits
 WEIGHT = 0.2  # of the newest value in the EWMA: 0.2 to 0.3 sees slow drifts (Hunter 1986; handbook, 6.3.2.4)
 LEAST_WEIGHT = 0.05
-ALLOWANCE = 0.5  # of the CUSUM that dates a change, in standard deviations: the best for shifts of one (handbook, 6.3.2.3)
+ALLOWANCE = (
+    0.5  # of the CUSUM that dates a change, in standard deviations: the best for shifts of one (handbook, 6.3.2.3)
+)
 FARTHEST = 5.0  # times the time observed: the line is not believed beyond
 
 
@@ -103,8 +106,8 @@ class Segment:
 
 @dataclass(frozen=True)
 class Reach:
-    """Where the 95 % band of a segment's drift reaches a limit: when, None if not within FARTHEST times the time observed, which
-    is until `asked`."""
+    """When the 95 % band of a segment's drift reaches a limit; None if not within FARTHEST times the time observed, which is
+    until `asked`."""
 
     limit: float
     upward: bool
@@ -149,14 +152,16 @@ def trend(history: History, *, weight: float = WEIGHT, baseline: int = BASELINE)
         ConfigError: the weight of the EWMA is not 0.05 to 1, or the baseline shorter than 8 runs.
     """
     if not LEAST_WEIGHT <= weight <= 1:
-        raise ConfigError(f"--lambda: found {weight:g}; expected {LEAST_WEIGHT} to 1. Next: 0.2 for slow drifts, 0.4 for steps")
+        raise ConfigError(
+            f"--lambda: found {weight:g}; expected {LEAST_WEIGHT} to 1. Next: 0.2 for slow drifts, 0.4 for steps"
+        )
     if baseline < BASELINE:
         raise ConfigError(f"--baseline: found {baseline}; expected {BASELINE} or more. Next: leave it out")
     return Trend(history, tuple(_segment(*part, weight, baseline) for part in _parted(history)), weight)
 
 
 def _parted(history: History) -> list[tuple[list[Result], list[float], tuple[str, ...]]]:
-    """Runs and times of each segment, with what was changed at its beginning. Plans that take turns are segments side by side."""
+    """Runs and times of each segment, with what was changed at its beginning; of plans that take turns each has its own."""
     parts: list[tuple[list[Result], list[float], tuple[str, ...]]] = []
     of_plan: dict[str, tuple[list[Result], list[float], tuple[str, ...]]] = {}
     for result, time in zip(history.results, history.times, strict=True):
@@ -226,11 +231,13 @@ def reaches(segment: Segment) -> list[Reach]:
 
 
 def steps(trend: Trend) -> list[Step | None]:
-    """From each segment to the next; None where too few runs are in them to know the scatter within (one-way analysis)."""
+    """From each segment to the next; None where one of the two drifts, so that it has no level of its own, and where too few
+    runs are in all to know the scatter within (one-way analysis)."""
     groups = [s.values for s in trend.segments]
     if len(groups) < 2 or sum(g.size for g in groups) <= len(groups):
         return [None] * (len(groups) - 1)
     found = one_way(groups)
     k = t_factor(found.dof_within) * found.residual
-    return [Step(float(np.mean(b) - np.mean(a)), k * (1 / a.size + 1 / b.size) ** 0.5)
-            for a, b in zip(groups, groups[1:], strict=False)]  # fmt: skip
+    drifts = [s.drift is not None and s.drift.shown for s in trend.segments]
+    return [None if c or d else Step(float(np.mean(b) - np.mean(a)), k * (1 / a.size + 1 / b.size) ** 0.5)
+            for (a, b), (c, d) in zip(pairwise(groups), pairwise(drifts), strict=True)]  # fmt: skip

@@ -1,0 +1,1 @@
+"""Runs over time: what the index keeps of them, compared and followed."""
