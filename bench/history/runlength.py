@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from functools import lru_cache
 from itertools import repeat
 
 import numpy as np
@@ -22,6 +23,8 @@ RANGE_VARIANCE = 2 - 4 / math.pi  # of |x_1 - x_2|
 NEIGHBOURS = (4 / math.pi) * (math.sqrt(0.75) + math.asin(0.5) / 2 - 1)  # covariance of |x_1 - x_2| and |x_2 - x_3|
 TAIL = 1e-10  # of the probability that no signal came yet: what follows is taken as geometric
 LONGEST = 100_000  # values
+GRID = 6.0  # standard deviations of a value: to where its normal density is taken
+MOST_WAVES, NOTHING = 2000, 1e-7  # of the characteristic function: how many at most, and what counts as zero
 SETTLED = 1e-7  # of the variance of z_i, short of the settled one: no more than the settled one is asked from then on
 
 
@@ -76,9 +79,7 @@ def average_run_length(
 def baseline(runs: int, centres: int = 9, sigmas: int = 24) -> tuple[Array, Array, Array]:
     """What a baseline of normal values makes of centre 0 and standard deviation 1: centres, sigmas and weights (p,).
 
-    The mean is normal with variance 1/runs and independent of the moving range (of differences only). The mean of runs - 1
-    moving ranges over d2 is taken as c chi_nu/sqrt(nu) with its exact mean and variance (Patnaik, Biometrika 37, 78 (1950)):
-    neighbours share a value, so that they are correlated.
+    The mean is normal with variance 1/runs and independent of the moving range, which is one of differences only.
 
     Raises:
         ValueError: fewer than three runs.
@@ -86,28 +87,40 @@ def baseline(runs: int, centres: int = 9, sigmas: int = 24) -> tuple[Array, Arra
     if runs < 3:
         raise ValueError(f"found a baseline of {runs} runs; expected 3 or more")
     x, w = np.polynomial.hermite_e.hermegauss(centres)
-    mean = 2 / math.sqrt(math.pi) / D2
-    variance = ((runs - 1) * RANGE_VARIANCE + 2 * (runs - 2) * NEIGHBOURS) / ((runs - 1) * D2) ** 2
-    nu, scale = _chi(variance / mean**2)
-    nodes, legendre = np.polynomial.legendre.leggauss(sigmas)
-    reach = 4.5 * math.sqrt(variance)
-    low, high = max(mean - reach, 0.02), mean + 1.3 * reach
-    s = (low + high) / 2 + (high - low) / 2 * nodes
-    chi = s * math.sqrt(nu) * scale / mean
-    density = legendre * np.exp((nu - 1) * np.log(chi) - chi * chi / 2 - (nu - 1) * math.log(math.sqrt(nu)) + nu / 2)
-    grid = np.meshgrid(x / math.sqrt(runs), s, indexing="ij")
-    both = np.outer(w / w.sum(), density / density.sum())
-    return grid[0].ravel(), grid[1].ravel(), both.ravel()
+    found, density = _moving_range(runs, sigmas)
+    grid = np.meshgrid(x / math.sqrt(runs), found / D2, indexing="ij")
+    return grid[0].ravel(), grid[1].ravel(), np.outer(w / w.sum(), density).ravel()
 
 
-def _chi(relative_variance: float) -> tuple[float, float]:
-    """Degrees of freedom of the chi with that variance over its mean squared, and its mean over sqrt(nu)."""
-    low, high = 0.5, 1e6
-    for _ in range(200):
-        nu = math.sqrt(low * high)
-        mean = math.sqrt(2) * math.exp(math.lgamma((nu + 1) / 2) - math.lgamma(nu / 2))
-        low, high = (nu, high) if nu / mean**2 - 1 > relative_variance else (low, nu)
-    return nu, mean / math.sqrt(nu)
+@lru_cache(maxsize=8)
+def _moving_range(runs: int, count: int) -> tuple[Array, Array]:
+    """Nodes and weights (count,) of the law of the mean of |x_i - x_i-1| of so many independent normal values.
+
+    Neighbours share a value. The characteristic function of the sum is E exp(i w sum |x_i - x_i-1|): the kernel
+    exp(i w |x - y|) applied runs - 1 times to the normal density, on a grid; its inversion gives the density.
+    """
+    x = np.linspace(-GRID, GRID, 145)
+    normal = np.exp(-x * x / 2)
+    normal /= normal.sum()
+    apart = np.abs(x[:, None] - x[None, :])
+    mean, variance = (runs - 1) * 2 / math.sqrt(math.pi), (runs - 1) * RANGE_VARIANCE + 2 * (runs - 2) * NEIGHBOURS
+    longest = mean + 8 * math.sqrt(variance)
+    low = max(mean - 5 * math.sqrt(variance), 0.01 * mean)
+    nodes, weights = np.polynomial.legendre.leggauss(count)
+    sums = (low + mean + 6.5 * math.sqrt(variance)) / 2 + (mean + 6.5 * math.sqrt(variance) - low) / 2 * nodes
+    density = np.full(count, 0.5)
+    for k in range(1, MOST_WAVES):
+        wave = k * math.pi / longest
+        kernel = np.exp(1j * wave * apart) * normal
+        found = np.ones(x.size, np.complex128)
+        for _ in range(runs - 1):
+            found = np.einsum("ij,j->i", kernel, found)  # BLAS would start threads that wait
+        characteristic = complex(normal @ found)
+        if abs(characteristic) < NOTHING:
+            break
+        density += np.real(characteristic * np.exp(-1j * wave * sums))
+    density = weights * np.maximum(density, 0.0)
+    return sums / (runs - 1), density / density.sum()
 
 
 def no_signal(means: Iterable[float], weight: float, runs: int, *, width: float = WIDTH) -> list[float]:
