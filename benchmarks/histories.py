@@ -29,7 +29,7 @@ from bench.run import index
 
 RIG, PROCEDURE, QUANTITY = "tsbs12", "amb-calibration", "K_i"
 PLAN = ("angles=1", "settle_s=0.3", "average_s=0.2")  # three rounds of the masses at one angle
-STILL, DRIFTING = 16, 10  # runs after the baseline
+STILL, DRIFTING = 12, 8  # runs after the baseline
 CHARTS = {"individuals": 1.0, "EWMA": WEIGHT}
 
 

@@ -53,7 +53,7 @@ def _segment(s: Segment, step: Step | None, position: int, trend: Trend, t: Told
         by = (
             ""
             if step is None
-            else f"; mean {_signed(step.change, t)} ± {t.with_unit(step.half)} against the one before"
+            else f"; mean {_signed(step.change, t, 1)} ± {t.with_unit(step.half, 1)} against the one before"
         )
         yield from _folded(f"segment {position + 1}{changed}{by}", 0)
     unit = f", {t.unit}" if t.unit else ""
@@ -72,8 +72,14 @@ def _row(number: str, when: str, value: str, u: str, ewma: str, strip: str, mark
 def _line(s: Segment, k: int, t: Told) -> str:
     averaged = None if s.chart is None or k < s.chart.baseline else float(s.chart.ewma[k - s.chart.baseline])
     when = t.when(float(s.times[k])).removeprefix("visit ")
-    return _row(str(k + 1), when, t.number(s.results[k].value), t.number(s.results[k].U), t.number(averaged),
-                _strip(s, float(s.values[k]), averaged), "".join(_marks(s, k)))  # fmt: skip
+    numbers = [_fitting(x, t, width) for x, width in ((s.results[k].value, 11), (s.results[k].U, 9), (averaged, 9))]
+    return _row(str(k + 1), when, *numbers, _strip(s, float(s.values[k]), averaged), "".join(_marks(s, k)))
+
+
+def _fitting(x: float | None, t: Told, width: int) -> str:
+    """A number in its column; one that is far larger than the others by its power of ten."""
+    number = t.number(x)
+    return number if x is None or len(number) <= width else f"{x / t.one / 10.0**t.power:.2g}"
 
 
 def _marks(s: Segment, k: int) -> list[str]:

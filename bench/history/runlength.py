@@ -24,7 +24,7 @@ NEIGHBOURS = (4 / math.pi) * (math.sqrt(0.75) + math.asin(0.5) / 2 - 1)  # covar
 TAIL = 1e-10  # of the probability that no signal came yet: what follows is taken as geometric
 LONGEST = 100_000  # values
 GRID = 6.0  # standard deviations of a value: to where its normal density is taken
-MOST_WAVES, NOTHING = 2000, 1e-7  # of the characteristic function: how many at most, and what counts as zero
+MOST_WAVES, NOTHING = 2000, 1e-6  # of the characteristic function: how many at most, and what counts as zero
 SETTLED = 1e-7  # of the variance of z_i, short of the settled one: no more than the settled one is asked from then on
 
 
@@ -76,7 +76,7 @@ def average_run_length(
     return total
 
 
-def baseline(runs: int, centres: int = 9, sigmas: int = 24) -> tuple[Array, Array, Array]:
+def baseline(runs: int, centres: int = 7, sigmas: int = 16) -> tuple[Array, Array, Array]:
     """What a baseline of normal values makes of centre 0 and standard deviation 1: centres, sigmas and weights (p,).
 
     The mean is normal with variance 1/runs and independent of the moving range, which is one of differences only.
@@ -99,7 +99,7 @@ def _moving_range(runs: int, count: int) -> tuple[Array, Array]:
     Neighbours share a value. The characteristic function of the sum is E exp(i w sum |x_i - x_i-1|): the kernel
     exp(i w |x - y|) applied runs - 1 times to the normal density, on a grid; its inversion gives the density.
     """
-    x = np.linspace(-GRID, GRID, 145)
+    x = np.linspace(-GRID, GRID, 97)
     normal = np.exp(-x * x / 2)
     normal /= normal.sum()
     apart = np.abs(x[:, None] - x[None, :])

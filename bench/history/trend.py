@@ -215,10 +215,11 @@ def _signals(values: Array, chart: Chart) -> tuple[Signal, ...]:
 
 
 def reaches(segment: Segment) -> list[Reach]:
-    """When the drift's band reaches the limits of the segment's newest run. All values may be off together by no more than that
-    run's U, so that the band about the true value has it in root of the sum of squares."""
+    """When the drift's band reaches the limits of the segment's newest run; none of fewer runs than a baseline has. All values
+    may be off together by no more than that run's U, so that the band about the true value has it in root of the sum of
+    squares."""
     drift, last = segment.drift, segment.results[-1]
-    if drift is None:
+    if drift is None or drift.count < BASELINE:
         return []
     now, first = float(segment.times[-1]), float(segment.times[0])
     asked = now + FARTHEST * (now - first)

@@ -12,6 +12,7 @@ from bench import display_units
 from bench.history.trend import Trend
 from bench.uncertainty import power_out, rounded_at
 
+SIGNIFICANT = 1e-6  # of the largest value: to where its digits are told at the most
 PER = (
     ("year", 365.25, 90.0),
     ("day", 1.0, 2.0),
@@ -85,9 +86,9 @@ def told(trend: Trend) -> Told:
     fine = [float(x) for x in expanded[np.isfinite(expanded) & (expanded > 0)]]
     fine = [float(np.median(fine))] if fine else []
     scatter = [2 * s.drift.scatter for s in trend.segments if s.drift is not None and s.drift.scatter > 0]
-    finest = min([*fine, *scatter], default=largest * 1e-4 or 1.0) / one
-    place = int(f"{max(finest, 1e-12 * largest / one, 1e-300):.1e}".partition("e")[2]) - 1
-    power = power_out(largest / one, place)
+    finest = max(min([*fine, *scatter], default=largest * 1e-4 or 1.0), SIGNIFICANT * largest) / one
+    place = int(f"{finest:.1e}".partition("e")[2]) - 1
+    power = power_out(max(largest / one, finest), place)
     times = trend.history.times
     if trend.history.axis == "visit":
         return Told(symbol, one, place, power, "visit", "visit", 1.0)
