@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from bench.cli.runs import runs_command
+from bench.cli.runs import RunsRequest, runs_command
 from bench.errors import ConfigError
 from bench.findings import SIMULATED_CONTROLLER, Finding
 from bench.quantity import Quantity
@@ -52,7 +52,7 @@ def test_a_live_run_on_a_simulation_says_so(tmp_path: Path, capsys: pytest.Captu
         write_record(path / "record.json", record)
         index.add(path)
     assert [bool(e.served) for e in index.entries(tmp_path)] == [False, True]
-    runs_command(tmp_path)
+    runs_command(RunsRequest(tmp_path))
     assert ["served simulation" in line for line in capsys.readouterr().out.splitlines()] == [False, True]
 
 

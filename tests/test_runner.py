@@ -27,7 +27,7 @@ from bench.procedure import Procedure
 from bench.progress import PlainProgress
 from bench.record.limits import Limit, Verdict
 from bench.record.outcomes import Outcome
-from bench.record.records import SCHEMA_FILE, Record
+from bench.record.records import SCHEMA_FILE, Record, read_record
 from bench.recording import Recording
 from bench.rigfile import RigFile, load_rig
 from bench.run import reanalysis, runner
@@ -118,7 +118,7 @@ def test_while_it_runs_the_record_says_unfinished(tmp_path: Path, run: Run) -> N
 
     def look(rig: Any, plan: Any, record: Any) -> None:
         (path,) = (tmp_path / "runs").glob("*/record.json")
-        seen.append(runner.index.read_record(path))
+        seen.append(read_record(path))
 
     run(procedure=dataclasses.replace(tiny_procedures.resting, acquire=look))
     assert seen[0].outcome is Outcome.ERROR

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from bench import display_units
+from bench.cli.told import unit_text, with_unit
 from bench.record.limits import Verdict
 from bench.record.records import LimitEntry, Measurement, Record
 from bench.uncertainty import stated
@@ -77,13 +78,12 @@ def _stem(m: Measurement) -> str:
 def _value(m: Measurement) -> str:
     if m.value is None or m.expanded_uncertainty is None:
         return "not measured"
-    symbol, one = display_units.of_result(m.unit, max(abs(m.value), m.expanded_uncertainty))
-    return f"{stated(m.value / one, m.expanded_uncertainty / one)}{_unit(symbol)}".replace("+-", "±")
+    return with_unit(m.value, m.expanded_uncertainty, m.unit)
 
 
 def _of_vector(v: Vector, unit: str) -> str:
     symbol, one = display_units.of_result(unit, max(v.amount, v.expanded))
-    told = f"{stated(v.amount / one, v.expanded / one)}{_unit(symbol)}"
+    told = f"{stated(v.amount / one, v.expanded / one)}{unit_text(symbol)}"
     angle = f" ∠ {stated(math.degrees(v.angle), math.degrees(v.swings))}°" if v.points else ""
     return f"{told}{angle}".replace("+-", "±")
 
@@ -93,12 +93,8 @@ def limit(entry: LimitEntry | None) -> str:
     if entry is None:
         return ""
     symbol, one = display_units.of_result(entry.unit, max(abs(x) for x in (entry.low, entry.high) if x is not None))
-    unit = _unit(symbol)
+    unit = unit_text(symbol)
     low, high = (None if x is None else f"{x / one:.4g}" for x in (entry.low, entry.high))
     if low is None:
         return f"at most {high}{unit}"
     return f"at least {low}{unit}" if high is None else f"{low} to {high}{unit}"
-
-
-def _unit(symbol: str) -> str:
-    return "" if symbol == "1" else f" {symbol}".replace(" u", " µ")

@@ -42,23 +42,53 @@ def analyse(run: RunArgument, verbose: Verbose = False) -> int:
 
     Writes RUN/analyses/<UTC>/record.json; the original stays as it is.
     """
-    from bench.cli.runs import analyse_command
+    from bench.cli.analyse import analyse_command
 
     return analyse_command(run, verbose)
 
 
 def report(run: RunArgument) -> int:
     """Build the report of a stored run again."""
-    from bench.cli.runs import report_command
+    from bench.cli.analyse import report_command
 
     return report_command(run)
 
 
-def runs(out: Out = Path("runs")) -> int:
-    """List the runs with their outcomes."""
-    from bench.cli.runs import runs_command
+def runs(
+    out: Out = Path("runs"),
+    procedure: Annotated[
+        str | None, typer.Option("--procedure", metavar="NAME", help="Of this procedure alone.")
+    ] = None,
+    rig: Annotated[str | None, typer.Option("--rig", metavar="NAME", help="Of the rig of this name alone.")] = None,
+    failed: Annotated[bool, typer.Option("--failed", help="Those alone that ended neither PASS nor DONE.")] = False,
+    last: Annotated[int | None, typer.Option("--last", metavar="N", min=1, help="The newest so many.")] = None,
+    show: Annotated[
+        list[str] | None, typer.Option("--show", metavar="QUANTITY", help="With this result, such as K_i; repeatable.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="As JSON.")] = False,
+) -> int:
+    """List the runs with their outcomes, oldest first."""
+    from bench.cli.runs import RunsRequest, runs_command
 
-    return runs_command(out)
+    return runs_command(RunsRequest(out, procedure, rig, failed, last, tuple(show or ()), as_json))
+
+
+def compare(
+    a: Annotated[
+        str, typer.Argument(metavar="A", help="A run directory, a run's name or its beginning, last, last~1.")
+    ],
+    b: Annotated[str, typer.Argument(metavar="B", help="Another one, of the same procedure.")],
+    out: Out = Path("runs"),
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Every quantity, and more of each budget.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="As JSON.")] = False,
+) -> int:
+    """Compare two runs: the difference B - A of each quantity, what they share removed.
+
+    |E_n| beyond 1: the 95 % interval of the difference leaves 0 out.
+    """
+    from bench.cli.compare import CompareRequest, compare_command
+
+    return compare_command(CompareRequest((a, b), out, verbose, as_json))
 
 
 def trend(

@@ -9,15 +9,15 @@ from collections.abc import Mapping
 from bench.findings import SIMULATED_CONTROLLER
 from bench.record.records import Measurement, Record, read_record
 from bench.rigfile.aliases import in_full
-from bench.run.indexrow import IndexEntry
+from bench.run.indexrow import IndexEntry, MadeWith, Row
 from bench.rundir import RunDirectory
 from bench.uncertainty import PROBABILITY
 
 DIGITS = 16  # of a digest: of a million different plans two agree once in 4e7
 
 
-def rows(run: RunDirectory) -> tuple[IndexEntry, list[tuple[object, ...]]]:
-    """A run's line and one for each of its results, as the tables have them.
+def row(run: RunDirectory) -> Row:
+    """A run with its results, as the tables have it.
 
     Raises:
         ConfigError: it holds no readable record.
@@ -29,12 +29,13 @@ def rows(run: RunDirectory) -> tuple[IndexEntry, list[tuple[object, ...]]]:
         run_id=run.run_id, procedure=record.procedure, rig=record.rig, outcome=record.outcome.value, started=record.started,
         ended=record.ended, seed=record.seed, visit=record.visit,
         served=any(f.code == SIMULATED_CONTROLLER for f in record.findings), uut=_uut(record),
+    )  # fmt: skip
+    made_with = MadeWith(
         settings=digest({k: v for k, v in record.plan.items() if v is not None}),
         parameters="" if setup is None else digest(setup.parameters), firmware="" if setup is None else setup.firmware,
         certificates=_certificates(record), calibrations=digest([(c.procedure, c.run_id) for c in record.calibrations]),
     )  # fmt: skip
-    aliases = {} if setup is None else setup.aliases
-    return entry, [_result(run.run_id, k, m, aliases) for k, m in enumerate(record.measurements)]
+    return Row(entry, made_with, [_result(m, {} if setup is None else setup.aliases) for m in record.measurements])
 
 
 def digest(content: object) -> str:
@@ -51,14 +52,14 @@ def _certificates(record: Record) -> str:
     return digest({i: (c.value, c.standard_uncertainty, c.distribution) for i, c in stated.items()})
 
 
-def _result(run_id: str, ordinal: int, m: Measurement, aliases: Mapping[str, str]) -> tuple[object, ...]:
+def _result(m: Measurement, aliases: Mapping[str, str]) -> tuple[tuple[str, ...], tuple[float | str | None, ...]]:
     name = f"{m.name}@{m.where}" if m.where else m.name
     full = in_full(aliases, name)
     kind, _, place = full.partition("@")
     lower, upper = (None, None) if m.limit is None else (m.limit.low, m.limit.high)
-    return (
-        run_id, ordinal, name, full, kind, place, m.unit, m.value, m.standard_uncertainty, m.expanded_uncertainty, m.dof,
-        m.coverage_probability or PROBABILITY, lower, upper, m.verdict.value,
+    return (name, full, kind, place, m.unit), (
+        m.value, m.standard_uncertainty, m.expanded_uncertainty, m.dof, m.coverage_probability or PROBABILITY, lower, upper,
+        m.verdict.value,
     )  # fmt: skip
 
 

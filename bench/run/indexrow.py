@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 
 class IndexEntry(NamedTuple):
-    """One run, as `bench runs` lists it. What makes runs comparable is kept as digests (`Result.changed`)."""
+    """One run, as `bench runs` lists it; `uut` is the machine's serial number, else its model."""
 
     run_id: str
     procedure: str
@@ -19,11 +19,25 @@ class IndexEntry(NamedTuple):
     visit: int | None
     served: bool  # live, on a controller that says that it is a simulated one
     uut: str
+
+
+class MadeWith(NamedTuple):
+    """What a run was made with, as `Result` has it."""
+
     settings: str
     parameters: str
     firmware: str
     certificates: str
     calibrations: str
+
+
+class Row(NamedTuple):
+    """A run as its record goes into the tables. Of each result what it is called (name, that by kind and place, kind, place,
+    unit) and its numbers (value, u, U, dof, coverage probability, limits, verdict)."""
+
+    entry: IndexEntry
+    made_with: MadeWith
+    results: list[tuple[tuple[str, ...], tuple[float | str | None, ...]]]
 
 
 class Result(NamedTuple):
