@@ -147,11 +147,8 @@ for of_stored_runs in (
     stored.analyse,
     stored.report,
     stored.runs,
-<<<<<<< HEAD
-    stored.trend,
-=======
     stored.compare,
->>>>>>> 746b421cb2679d8dc1a7e0f5e0e276b1af478b37
+    stored.trend,
     stored.export,
 ):
     app.command()(of_stored_runs)
