@@ -52,7 +52,7 @@ LONG = (
     "add-a-device", "adopt-a-calibration", "amb-calibration", "angle-step", "balance", "bearing-model",
     "change-a-plan", "coast-down", "compare", "compensation", "connect-a-rig", "first-calibration", "force-constant",
     "force-coupling", "force-map", "inject-faults", "lift-off", "maximum-speed", "model", "negative-stiffness",
-    "run-a-campaign", "run-up", "sensitivity", "slew", "spindown", "step", "torque-constant", "tracking", "unbalance",
+    "run-a-campaign", "run-up", "sensitivity", "slew", "spindown", "step", "torque-constant", "tracking", "trend", "unbalance",
     "use-in-ci",
 )  # fmt: skip
 """Pages that take long, or that only run a procedure: by default `tests/procedures` takes each through its whole path and

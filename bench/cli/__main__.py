@@ -179,6 +179,7 @@ for of_stored_runs in (
     stored.report,
     stored.runs,
     stored.compare,
+    stored.trend,
     stored.export,
 ):
     app.command()(of_stored_runs)

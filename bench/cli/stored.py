@@ -92,6 +92,32 @@ def compare(
     return compare_command(CompareRequest((a, b), out, verbose, as_json))
 
 
+def trend(
+    quantity: Annotated[str, typer.Argument(metavar="QUANTITY", help="A name of results, as K_i or K@inboard.")],
+    rig: Annotated[
+        str | None, typer.Option("--rig", metavar="NAME", help="Only runs of this rig, as records name it.")
+    ] = None,
+    procedure: Annotated[
+        str | None, typer.Option("--procedure", metavar="NAME", help="Only runs of this procedure.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option("--seed", min=0, help="Only runs of this virtual machine.")] = None,
+    out: Out = Path("runs"),
+    last: Annotated[int, typer.Option("--last", metavar="N", min=2, help="The newest N runs.")] = 100,
+    weight: Annotated[float, typer.Option("--lambda", help="Weight of the newest value in the EWMA.")] = 0.2,
+    baseline: Annotated[
+        int, typer.Option("--baseline", metavar="N", help="First runs of a segment that make its limits.")
+    ] = 8,
+    json: Annotated[bool, typer.Option("--json", help="As data, for programs.")] = False,
+    figure: Annotated[Path | None, typer.Option("--figure", metavar="FILE", help="Also draw it, as SVG.")] = None,
+) -> int:
+    """Follow a quantity over the runs of a folder: control charts, drift, and when its limit is near."""
+    from bench.cli.trend import TrendRequest, trend_command
+
+    asked = TrendRequest(quantity=quantity, out=out, rig=rig, procedure=procedure, seed=seed, last=last, weight=weight,
+                         baseline=baseline, json=json, figure=figure)  # fmt: skip
+    return trend_command(asked)
+
+
 def export(
     run: RunArgument,
     to: Annotated[Table, typer.Option("--to", help="File format of the tables.")] = Table.PARQUET,

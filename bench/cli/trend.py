@@ -1,0 +1,87 @@
+"""`bench trend`: a quantity over the runs of a folder."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from bench.errors import BenchError, ConfigError
+from bench.history.series import one_history
+from bench.history.trend import Trend, trend
+from bench.run import index
+from bench.wholefile import write_whole
+
+
+@dataclass(frozen=True)
+class TrendRequest:
+    """What was asked for on the command line."""
+
+    quantity: str
+    out: Path
+    rig: str | None = None
+    procedure: str | None = None
+    seed: int | None = None
+    last: int = 100
+    weight: float = 0.2
+    baseline: int = 8
+    json: bool = False
+    figure: Path | None = None
+
+
+def trend_command(asked: TrendRequest) -> int:
+    """The trend on standard output, as text or JSON; with `figure` also as a drawing.
+
+    Raises:
+        ConfigError: nothing to follow, several things, or an option that cannot be.
+        BenchError: the index can neither be read nor rebuilt.
+    """
+    if asked.figure is not None and asked.figure.suffix != ".svg":
+        raise ConfigError(f"--figure {asked.figure}: found {asked.figure.suffix or 'no ending'}; expected .svg. "
+                          f"Next: --figure {asked.figure.with_suffix('.svg')}")  # fmt: skip
+    found, older = found_trend(asked)
+    if asked.json:
+        from bench.history.trendjson import as_data
+
+        sys.stdout.write(json.dumps(as_data(found), indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+    else:
+        from bench.cli.trend_table import text
+
+        sys.stdout.write(text(found, older))
+    if asked.figure is not None:
+        write_whole(asked.figure, drawn(found))
+        sys.stderr.write(f"figure: {asked.figure}\n")
+    return 0
+
+
+def found_trend(asked: TrendRequest) -> tuple[Trend, bool]:
+    """The trend, and whether there are older runs than it has."""
+    if not asked.out.is_dir():
+        raise ConfigError(
+            f"--out {asked.out}: found no folder there; expected one of run directories. Next: name it with --out"
+        )
+    try:
+        # Of a virtual machine all runs are read: the index does not choose by seed.
+        most = asked.last + 1 if asked.seed is None else None
+        results = index.results(
+            asked.out, quantity=asked.quantity, procedure=asked.procedure, rig=asked.rig, last=most
+        )  # fmt: skip
+        if asked.seed is not None:
+            results = [r for r in results if r.seed == asked.seed]
+        runs = list(dict.fromkeys(r.run_id for r in results))
+        kept = set(runs[-asked.last :])
+        history = one_history([r for r in results if r.run_id in kept], asked.quantity, lambda: index.names(asked.out),
+                              str(asked.out))  # fmt: skip
+    except (sqlite3.Error, OSError) as error:
+        raise BenchError(f"{asked.out / index.NAME}: the index cannot be used: {error}") from error
+    return trend(history, weight=asked.weight, baseline=asked.baseline), len(runs) > asked.last
+
+
+def drawn(found: Trend) -> str:
+    """The figure as SVG, in the style of the reports."""
+    from bench.history.trendfigure import figure
+    from reports.figures import draw
+
+    return draw(figure(found)).svg

@@ -1,0 +1,198 @@
+"""A trend on the terminal, in 80 columns: a line for each run with a strip of its chart, below each segment what it shows."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator
+from itertools import repeat
+
+from bench.history.runlength import no_signal
+from bench.history.series import machine
+from bench.history.trend import FARTHEST, Reach, Segment, Signal, Step, Trend, reaches, steps
+from bench.history.trendunits import Told, told
+
+WIDTH = 80
+STRIP, LIMIT = 21, 7  # columns of the strip, and from its middle to a limit
+MARKS = {
+    "x": "value beyond its limits",
+    "e": "EWMA beyond its limits",
+    "w": "own U wider than the limits",
+    "F": "FAIL",
+    "?": "INDETERMINATE",
+}
+CHANCES = 60  # runs after the baseline up to which the chance of a false alarm is told
+
+
+def text(trend: Trend, older: bool) -> str:
+    """All of it; `older`: there are runs of before that were not asked for."""
+    t = told(trend)
+    lines = [*_head(trend, t, older)]
+    for k, (segment, step) in enumerate(zip(trend.segments, [None, *steps(trend)], strict=True)):
+        lines += ["", *_segment(segment, step, k, trend, t)]
+    used = {mark for segment in trend.segments for k in range(len(segment.results)) for mark in _marks(segment, k)}
+    if used:
+        lines += ["", *_folded("marks: " + ", ".join(f"{m} {said}" for m, said in MARKS.items() if m in used), 0)]
+    return "\n".join(lines) + "\n"
+
+
+def _head(trend: Trend, t: Told, older: bool) -> list[str]:
+    first, times = trend.history.results[0], trend.history.times
+    of = f"{trend.name} of {first.procedure} on {machine(first)}"
+    span = f"{len(times)} runs, {t.when(times[0])} to {t.when(times[-1])}"
+    left = [
+        "older ones are not shown (--last)" if older else "",
+        f"{trend.history.broken} without a value left out" if trend.history.broken else "",
+        f"{trend.history.repeated} repeated simulations left out" if trend.history.repeated else "",
+    ]
+    return _folded(of, 0) + _folded("; ".join(x for x in (span, *left) if x), 0)
+
+
+def _segment(s: Segment, step: Step | None, position: int, trend: Trend, t: Told) -> Iterator[str]:
+    if len(trend.segments) > 1:
+        changed = f": new {', '.join(s.changed)}" if s.changed else ""
+        by = (
+            ""
+            if step is None
+            else f"; mean {_signed(step.change, t, 1)} ± {t.with_unit(step.half, 1)} against the one before"
+        )
+        yield from _folded(f"segment {position + 1}{changed}{by}", 0)
+    unit = f", {t.unit}" if t.unit else ""
+    yield _row("no", "visit" if t.axis == "visit" else "date, UTC", f"value{unit}", "U", "EWMA", _heading(s), "")
+    for k in range(len(s.results)):
+        if s.chart is not None and k == s.chart.baseline:
+            yield _row("", "", "", "", "", f"{'-' * STRIP}", "")
+        yield _line(s, k, t)
+    yield from (line for said in _said(s, t, trend.weight) for line in _folded(said, 2))
+
+
+def _row(number: str, when: str, value: str, u: str, ewma: str, strip: str, marks: str) -> str:
+    return f"{number:>3} {when:<16} {value:>11} {u:>9} {ewma:>9} {strip:<{STRIP}} {marks}".rstrip()
+
+
+def _line(s: Segment, k: int, t: Told) -> str:
+    averaged = None if s.chart is None or k < s.chart.baseline else float(s.chart.ewma[k - s.chart.baseline])
+    when = t.when(float(s.times[k])).removeprefix("visit ")
+    numbers = [_fitting(x, t, width) for x, width in ((s.results[k].value, 11), (s.results[k].U, 9), (averaged, 9))]
+    return _row(str(k + 1), when, *numbers, _strip(s, float(s.values[k]), averaged), "".join(_marks(s, k)))
+
+
+def _fitting(x: float | None, t: Told, width: int) -> str:
+    """A number in its column; one that is far larger than the others by its power of ten."""
+    number = t.number(x)
+    return number if x is None or len(number) <= width else f"{x / t.one / 10.0**t.power:.2g}"
+
+
+def _marks(s: Segment, k: int) -> list[str]:
+    wide = s.wide[k] and not all(s.wide)
+    found = {"x": s.beyond[k], "e": s.ewma_beyond[k], "w": wide, "F": s.results[k].outcome == "FAIL",
+             "?": s.results[k].outcome == "INDETERMINATE"}  # fmt: skip
+    return [mark for mark, said in found.items() if said]
+
+
+def _heading(s: Segment) -> str:
+    return "" if s.chart is None else f"{'-limit':>{STRIP // 2 - LIMIT + 4}}{'mean':^{2 * LIMIT - 5}}{'+limit'}"
+
+
+def _strip(s: Segment, value: float, averaged: float | None) -> str:
+    """Limits `|`, centre `:`, EWMA `~` and value `o` side by side; what lies farther off stands at the end as `<` or `>`."""
+    middle = STRIP // 2
+    cells = [" "] * STRIP
+    if s.chart is not None:
+        centre, half = s.chart.limits.centre, s.chart.limits.half
+        cells[middle - LIMIT] = cells[middle + LIMIT] = "|"
+    else:
+        centre, half = float(s.values.mean()), float(abs(s.values - s.values.mean()).max())
+    cells[middle] = ":"
+    for mark, x in (("~", averaged), ("o", value)):
+        if x is not None:
+            off = round(LIMIT * (x - centre) / half) if half > 0 else 0
+            inside = abs(off) <= middle
+            cells[middle + max(-middle, min(middle, off))] = mark if inside else "<" if off < 0 else ">"
+    return "".join(cells)
+
+
+def _said(s: Segment, t: Told, weight: float) -> Iterator[str]:
+    """What a segment shows, a sentence each."""
+    if s.chart is None:
+        yield f"limits: none; they take a baseline of 8 runs or more of one segment, found {len(s.results)}"
+    else:
+        limits = s.chart.limits
+        yield (f"limits: {t.with_unit(limits.centre)} ± {t.with_unit(limits.half)}, three standard deviations by the moving "
+               f"range of the first {s.chart.baseline} runs")  # fmt: skip
+        if all(s.wide):
+            yield ("U is wider than the limits in every run: what the runs have in common does not scatter, and the chart says "
+                   "nothing of it")  # fmt: skip
+        for signal in s.signals:
+            yield _signal(signal, s, t, weight)
+        if not s.signals and len(s.results) > s.chart.baseline:
+            yield f"no signal in the {len(s.results) - s.chart.baseline} runs since"
+    yield from _drift(s, t)
+
+
+def _signal(g: Signal, s: Segment, t: Told, weight: float) -> str:
+    baseline = s.chart.baseline if s.chart is not None else 0
+    way = "above" if g.upward else "below"
+    shown = f"{g.chart}: {way} its limits first in run {g.at + 1} ({s.results[g.at].run_id})"
+    began = f"; the change began about run {g.began + 1} (CUSUM)"
+    watched = len(s.results) - baseline
+    if watched > CHANCES:
+        return shown + began
+    left = no_signal(repeat(0.0, watched), 1.0 if g.chart == "individuals" else weight, baseline)[-1]
+    by_chance = (
+        f"Of machines that do not change {100 * (1 - left):.0f} % show one by now, with limits from {baseline} runs"
+    )
+    return f"{shown}{began}. {by_chance}"
+
+
+def _drift(s: Segment, t: Told) -> Iterator[str]:
+    d = s.drift
+    if d is None:
+        yield f"drift: not known; it takes three runs at different times, found {len(s.results)}"
+        return
+    slope, half = t.slope(d.slope), t.slope(d.half)
+    finer = _digits(half, t)
+    shown = "" if d.shown else ": no drift is shown"
+    yield (f"drift: {_signed(slope, t, finer)} ± {t.with_unit(half, finer)} per {t.per} (95 %){shown}; scatter about it "
+           f"{t.with_unit(d.scatter, 1)}, {d.dof} degrees of freedom")  # fmt: skip
+    if s.excess is not None:
+        yield (f"the runs scatter {s.excess:.2g} times as much as their own uncertainties can explain: something moves them "
+               "that no budget has")  # fmt: skip
+    yield from _advice(s, t)
+
+
+def _advice(s: Segment, t: Told) -> Iterator[str]:
+    """When the drift's band reaches the limits."""
+    found = reaches(s)
+    far = [r for r in found if r.time is None]
+    if found and len(far) == len(found):
+        ends = " nor ".join(_limit(r, t) for r in far)
+        none = "reaches neither" if len(far) == 2 else "does not reach"
+        yield f"the drift's 95 % band {none} {ends} until {t.day(far[0].asked)}, {FARTHEST:g} times the time observed"
+    for r in found:
+        if r.time is not None and r.time <= s.times[-1]:
+            yield f"the drift's 95 % band has reached {_limit(r, t)}, by the last run"
+        elif r.time is not None:
+            yield (f"the drift's 95 % band reaches {_limit(r, t)}, on {t.day(r.time)}: advice (ILAC-G24, method 2), not a due "
+                   "date")  # fmt: skip
+
+
+def _limit(r: Reach, t: Told) -> str:
+    unit = "" if t.symbol == "1" else f" {t.symbol}"
+    return f"the {'upper' if r.upward else 'lower'} limit {r.limit / t.one:.6g}{unit}"
+
+
+def _digits(half: float, t: Told) -> int:
+    """How many digits finer than values a slope is told: two of its interval."""
+    if half <= 0:
+        return 0
+    return max(0, t.place - (int(f"{half / t.one:.1e}".partition("e")[2]) - 1))
+
+
+def _signed(value: float, t: Told, finer: int = 0) -> str:
+    number = t.number(value, finer)
+    return number if number.startswith("-") else f"+{number}"
+
+
+def _folded(said: str, indent: int) -> list[str]:
+    return textwrap.wrap(said, WIDTH, initial_indent=" " * indent, subsequent_indent=" " * (indent + 2 * bool(indent)),
+                         break_long_words=False, break_on_hyphens=False)  # fmt: skip
