@@ -167,7 +167,7 @@ def change(*keys: str | int, to: Any) -> str:
         ("[1]", "no schema"),
         ("{}", "no schema"),
         ('{"schema": 1}', "run_id"),
-        (change("schema", to=3), "newer"),
+        (change("schema", to=4), "newer"),
         (change("schema", to=0), "schema: found 0"),
         (change("schema", to=True), "no schema"),
         (change("extra", to=1), "extra"),

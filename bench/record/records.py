@@ -24,8 +24,8 @@ from bench.schema import STRICT, require_schema
 from bench.uncertainty import PROBABILITY, Estimate, Interval, budget, correlation_matrix, interval
 from bench.wholefile import write_whole
 
-SCHEMA = 2
-"""2: outcome DONE, findings with `concerns`. Records of schema 1 are read as they stand."""
+SCHEMA = 3
+"""2: outcome DONE, findings with `concerns`. 3: `continues`. Older records are read as they stand."""
 SCHEMA_FILE = Path(__file__).with_name("record.schema.json")
 
 
@@ -120,6 +120,20 @@ class RecordingFile:
 
 
 @dataclass(frozen=True)
+class ContinuedRun:
+    """A stopped run whose completed steps this one's recording took over: its name, recording and digest of that, how many
+    steps, when it was started (ISO 8601, UTC), and by what it was `stopped`, a code of a finding or `killed`."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = STRICT
+    run_id: str
+    file: str
+    sha256: str
+    steps: int
+    started: str
+    stopped: str
+
+
+@dataclass(frozen=True)
 class Correlations:
     """Correlation coefficients of the measured quantities, in the order of `names`."""
 
@@ -131,10 +145,10 @@ class Correlations:
 @dataclass(frozen=True)
 class Record:
     """`record.json`. Times are ISO 8601 UTC; `seed` and `visit` are None for a real rig; `plan` is in SI. Older records of
-    virtual rigs do not say the visit, which was 0."""
+    virtual rigs do not say the visit, which was 0. `continues` are the stopped runs that it goes on with, oldest first."""
 
     __pydantic_config__: ClassVar[ConfigDict] = STRICT
-    schema: Literal[1, 2]
+    schema: Literal[1, 2, 3]
     run_id: str
     procedure: str
     rig: str
@@ -148,6 +162,7 @@ class Record:
     calibrations: tuple[Used, ...]
     versions: Mapping[str, str]
     recording: RecordingFile | None
+    continues: tuple[ContinuedRun, ...] = field(default=(), kw_only=True)
     link: LinkCounts
     findings: tuple[FindingEntry, ...]
     measurements: tuple[Measurement, ...]
@@ -218,7 +233,7 @@ def unfinished(
     text = "The run did not end: its process was killed, lost power or could write nothing any more."
     said = Finding("unfinished", text, "", Effect.ERROR)
     return Record(
-        schema=2, run_id=run_id, procedure=procedure, rig=rig, uut=uut, outcome=Outcome.ERROR, started=started,
+        schema=3, run_id=run_id, procedure=procedure, rig=rig, uut=uut, outcome=Outcome.ERROR, started=started,
         ended=None, seed=seed, visit=None if seed is None else visit, plan=plan,
         calibrations=tuple(c.summary for c in calibrations), versions=versions, recording=None, link=LinkCounts(),
         findings=findings_of([said]), measurements=(), correlations=Correlations((), ()),

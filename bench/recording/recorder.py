@@ -20,11 +20,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from bench import lock
 from bench.calibration import Calibration
 from bench.calibration.file import attached
 from bench.clock import Clock
 from bench.errors import RecordingError
 from bench.link.frames import FRAME, FrameBatch
+from bench.recording.layout import counts_of
 from bench.recording.mcapwriter import McapWriter
 from bench.rigfile import RigFile
 from bench.rigfile.aliases import with_full_names
@@ -85,6 +87,7 @@ class Recorder:
         self.path, self._clock, self._live, self._plain = path, clock, live, plain
         self.integrity = Integrity()
         self._newest: tuple[int, frozenset[str]] = (-1, frozenset())  # step: its number and its labels
+        self._completed: tuple[tuple[str, Mapping[str, Any]], ...] = ()  # steps that were taken over
         self._watched: dict[str, list[npt.NDArray[np.float64]]] = {}  # by channel: what came of it
         self._header = header
         self.wall: dict[str, str] = {}
@@ -94,6 +97,7 @@ class Recorder:
         self._high_water = 0
         try:
             self._file = path.open("xb")
+            lock.hold(self._file.fileno())
         except OSError as error:
             raise RecordingError(f"recording {path}: cannot be written: {error.strerror or error}") from error
         try:
@@ -127,6 +131,29 @@ class Recorder:
             kept = batch if self._plain else batch.astype(FRAME, copy=True)  # written at once, or by the thread
             self._put("frames", link, lag_ns, kept)
             _add(self.integrity.frames, link, len(batch))
+
+    def take(self, messages: Sequence[tuple[str, int, bytes]]) -> None:
+        """Take messages of another recording over: topic, time and bytes (`bench.recording.takeover`)."""
+        self._put("taken", messages)
+        for topic, _, data in messages:
+            for kind, (name, count) in counts_of(topic, data).items():
+                if kind == "events":
+                    self.integrity.events += count
+                else:
+                    _add(getattr(self.integrity, kind), name, count)
+
+    def go_on(self, begun: int, completed: tuple[tuple[str, Mapping[str, Any]], ...]) -> None:
+        """What is recorded next comes after `begun` steps that were taken over, of which these were `completed`."""
+        self.integrity.steps, self._completed = begun, completed
+
+    def completed(self, kind: str) -> tuple[Mapping[str, Any], ...]:
+        """Labels of the steps of a kind that a stopped run had completed and this one, which continues it, need not record."""
+        return tuple(labels for name, labels in self._completed if name == kind)
+
+    @property
+    def waiting(self) -> int:
+        """How much the writer has yet to do."""
+        return self._queue.qsize()
 
     def stream(self, layout: StreamLayout) -> None:
         """Add a stream, such as a capture, while recording.

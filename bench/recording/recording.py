@@ -237,6 +237,10 @@ class Recording(Attachments[P]):
                 _, records = layout.decode_frames(data)
                 yield frames_of(records, self.version)
 
+    def everything(self) -> Iterator[tuple[str, int, bytes]]:
+        """Topic, time and bytes of every message as it stands in the file, in its order."""
+        return self._file.everything()
+
     def close(self) -> None:
         """Nothing stays open between reads; here for symmetry with the recorder."""
 

@@ -19,6 +19,8 @@ from bench.recording.steps import Step, Steps
 from bench.rigfile.roles import STATUS
 
 Array = npt.NDArray[np.float64]
+AGAIN = "-again"
+"""End of the kind of a step that repeats one."""
 Samples = Mapping[str, npt.NDArray[Any]]
 
 
@@ -33,9 +35,9 @@ Kind = TypeVar("Kind", bound=Labels, covariant=True)
 Read = TypeVar("Read", bound=Labels)
 
 
-def record_step(record: Recorder, labels: Labels) -> AbstractContextManager[None]:
-    """A step with these labels."""
-    return record.step(labels.kind, **asdict(labels))
+def record_step(record: Recorder, labels: Labels, *, again: bool = False) -> AbstractContextManager[None]:
+    """A step with these labels; `again`: it repeats one of a stopped run that goes on, and is of a kind of its own."""
+    return record.step(f"{labels.kind}{AGAIN}" if again else labels.kind, **asdict(labels))
 
 
 @dataclass(frozen=True)
