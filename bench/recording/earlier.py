@@ -19,6 +19,8 @@ from bench.recording.steps import Step
 
 CONTINUED: Final = "continued"
 """Event where a recording goes on that another one began: what that one was, and what was taken over of it."""
+AGAIN: Final = "-again"
+"""End of the kind of a step that repeats the last one of a stopped run."""
 LATER_NS: Final = 1_000_000_000  # frames are written later than the samples in them are dated, by less
 Message = tuple[str, int, bytes]
 

@@ -2,13 +2,12 @@
 
 The same mass at the same angle asks for the same force. What the fit's terms make of the currents of both hangings, less what
 positions add, differs by d = r' - r; a hanging scatters (its strap seats anew, noise) by the covariance that the residuals
-of the other angles have, so that d has twice that variance. |d| beyond Student's t at CHANCE is a drift, told with its 95 % interval:
-of current or position sensors, of the magnets, or a hanger that hangs otherwise.
+of the other angles have, so that d has twice that variance. |d| beyond Student's t at CHANCE is a drift, told with its 95 %
+interval: of current or position sensors, of the magnets, or a hanger that hangs otherwise.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -17,7 +16,7 @@ import numpy.typing as npt
 
 from bench.findings import Effect, Finding
 from bench.recording import Recording
-from bench.recording.earlier import CONTINUED
+from bench.recording.earlier import AGAIN, CONTINUED
 from bench.recording.steps import Step, Steps
 from bench.uncertainty.coverage import coverage_factor
 from procedures.amb_calibration.fit import Fit, Hangings, left_over
@@ -26,7 +25,6 @@ from procedures.amb_calibration.plan import Plan
 from procedures.amb_calibration.pulls import Pull, pulls
 from procedures.amb_calibration.scatter import Scatter, scatter
 from procedures.amb_calibration.steps import Hang, HangingData, arrays
-from procedures.shared.step_table import AGAIN
 
 Array = npt.NDArray[np.float64]
 DRIFTED, UNCHECKED = "drift-between-halves", "halves-unchecked"
@@ -96,8 +94,8 @@ def _drifts(found: Difference, data: HangingData, f: Fit) -> Iterator[Finding]:
         share = abs(d) / float(np.ptp(f.forces[b]))
         text = (
             f"the last hanging before the run was stopped ({what}), done again when it went on, asks the {axis.title} for "
-            f"{d:+.3f} N ± {k * u:.3f} N more ({share:.2%} of the load range): something drifted between the halves, a current or "
-            "position sensor, the magnets, or how the hanger hangs. Next: run it anew, all in one"
+            f"{d:+.3f} N ± {k * u:.3f} N more ({share:.2%} of the load range): something drifted between the halves, a current "
+            "or position sensor, the magnets, or how the hanger hangs. Next: run it anew, all in one"
         )
         yield Finding(DRIFTED, text, axis.where, Effect.INDETERMINATE)
 

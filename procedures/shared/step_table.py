@@ -14,13 +14,12 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.errors import AnalysisError
+from bench.recording.earlier import AGAIN
 from bench.recording.recorder import Recorder
 from bench.recording.steps import Step, Steps
 from bench.rigfile.roles import STATUS
 
 Array = npt.NDArray[np.float64]
-AGAIN = "-again"
-"""End of the kind of a step that repeats one."""
 Samples = Mapping[str, npt.NDArray[Any]]
 
 
