@@ -52,12 +52,12 @@ def planned(request: Request, earlier: Earlier | None = None) -> tuple[Procedure
     _refuse_mixed_backends(request)
     procedure = load_procedure(request.procedure)
     rig = with_links(load_rig(request.rig), request.links)
+    if earlier is not None:
+        stopped.require_same_rig(earlier.recording, rig)
     procedure = procedure.on(rig)
     if lacking := procedure.lacking(rig):
         raise ConfigError("\n  ".join([f"{rig.name} cannot run {procedure.name}; nothing was started:", *lacking]))
     defaults = (f"{rig.path} [plans.{procedure.name}]", rig.plans.get(procedure.name, {}))
-    if earlier is not None:
-        stopped.require_same_rig(earlier.recording, rig)
     if earlier is None or request.plan or request.plan_file is not None:
         plan = plans.assemble(procedure.plan, defaults, request.plan_file, request.plan)
     else:
@@ -119,7 +119,7 @@ def _job(request: Request, job: Job, asking: Asking) -> tuple[Job, Connect]:
     visit = request.visit or 0
     settings = job.procedure.settings(rig, job.plan)
     again = {} if job.earlier is None else {
-        "part": job.earlier.part, "start_ns": continuing.switched_on_ns(job.earlier)}  # fmt: skip
+        "stretch": job.earlier.stretch, "start_ns": continuing.switched_on_ns(job.earlier)}  # fmt: skip
     connect = simulated(
         rig, job.seed, overrides, request.operator or "auto", settings, injected, asking, visit=visit, **again
     )

@@ -54,7 +54,7 @@ def simulated(
     asking: console.Asking = console.quietly,
     *,
     visit: int = 0,
-    part: int = 0,
+    stretch: int = 0,
     start_ns: int | None = None,
 ) -> Connect:
     """How to open a simulated rig. The truth is drawn now, so that a wrong override is found before the start.
@@ -64,7 +64,7 @@ def simulated(
     """
     from sim_backend.truth import draw
 
-    drawn = draw(rig, seed, overrides, settings, visit=visit, part=part)
+    drawn = draw(rig, seed, overrides, settings, visit=visit, stretch=stretch)
     return of_truth(rig, drawn, operator, injected, asking, start_ns=start_ns)
 
 

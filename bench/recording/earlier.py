@@ -54,7 +54,7 @@ class Earlier:
         return self.steps[-1].end_ns
 
     @property
-    def part(self) -> int:
+    def stretch(self) -> int:
         """Number of what goes on with it: 1, 2, ..."""
         return 1 + len(self.recording.events(CONTINUED))
 
