@@ -41,7 +41,7 @@ PLAN: Mapping[str, Any] = {"angles": 8, "settle_s": 0.3, "average_s": 0.2}
 PLANTS: Mapping[str, tuple[float, ...]] = {
     "i_yo_p.offset": (0.003, 0.01, 0.03),  # A
     "i_yo_p.gain": (0.001, 0.003, 0.01),  # relative
-    "weight_left_kg": (0.001, 0.003, 0.01),
+    "hanger": (0.003, 0.01, 0.03),  # kg
     "position_offset_yo": (1e-6, 3e-6, 1e-5),  # m
 }
 """By how much a value changes while the machine is off."""

@@ -6,13 +6,10 @@ steps and needs no other file.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any, Final
 
-from bench.errors import RecordingError
 from bench.recording import layout
 from bench.recording.recording import Recording
 from bench.recording.steps import Step
@@ -27,73 +24,77 @@ Message = tuple[str, int, bytes]
 
 @dataclass(frozen=True)
 class Earlier:
-    """The completed steps of a `recording`. `told` is what the event that marks the seam says of it, JSON values."""
+    """The completed `steps` of a `recording`; make it with `left_in`, which reads all that takes long.
+
+    Attributes:
+        end_ns: end of the last of them.
+        last_ns: time of the last event or sample.
+        begun: how many steps were begun till then; the numbers of later ones go on from there.
+        kept: which of the events are taken over, by their number in the file: those to the end of the last completed step.
+        later: what a person said of these steps after that.
+        told: what the event that marks the seam says of it, JSON values.
+    """
 
     recording: Recording[Any]
+    steps: tuple[Step, ...]
+    end_ns: int
+    last_ns: int
+    begun: int
+    kept: int
+    later: tuple[Message, ...]
     told: Mapping[str, Any] = field(default_factory=dict)
-
-    @cached_property
-    def steps(self) -> tuple[Step, ...]:
-        """Those that ended, and whose samples are there to their end: what a killed process had not written is not done."""
-        steps = self.recording.all_steps().items
-        if not steps:
-            return ()
-        period = self.recording.streams["telemetry"].period_ns
-        reached = max((int(b.t_ns[-1]) for b in self.recording.blocks("telemetry", steps[-1].start_ns)), default=0)
-        return tuple(s for s in steps if s.end_ns <= reached + 2 * period)
-
-    @property
-    def end_ns(self) -> int:
-        """End of the last of them.
-
-        Raises:
-            RecordingError: there is none.
-        """
-        if not self.steps:
-            raise RecordingError(f"recording {self.recording.path}: no step was completed")
-        return self.steps[-1].end_ns
 
     @property
     def stretch(self) -> int:
         """Number of what goes on with it: 1, 2, ..."""
         return 1 + len(self.recording.events(CONTINUED))
 
-    @cached_property
-    def last_ns(self) -> int:
-        """Time of the last event or sample."""
-        blocks = self.recording.blocks("telemetry", self.end_ns)
-        return max(*(e["t_ns"] for e in self.recording.events()), *(int(b.t_ns[-1]) for b in blocks), self.end_ns)
-
-    @property
-    def begun(self) -> int:
-        """How many steps were begun, completed or not: the numbers of later ones go on from there."""
-        return 1 + max((int(e["step"]) for e in self._kept_events() if e["kind"] == "step-begin"), default=-1)
-
     def messages(self) -> Iterator[Message]:
         """Topic, time and data of what is taken over, in the order of the file: samples, views and frames to the end of the
         last completed step, events to there, and what a person said later of those steps."""
-        kept = iter([event["data"] for event in self._kept(self._events())])
-        following = next(kept, None)
-        for topic, t_ns, data in self.recording.everything():
+        events, raw = 0, layout.raw_topic("")
+        for topic, t_ns, data in self.recording.everything(self.end_ns + LATER_NS):
             if topic == layout.EVENTS:
-                if data == following:
+                events += 1
+                if events <= self.kept:
                     yield topic, t_ns, data
-                    following = next(kept, None)
-            elif t_ns <= self.end_ns + (LATER_NS if topic.startswith(layout.raw_topic("")) else 0):
+            elif t_ns <= self.end_ns + (LATER_NS if topic.startswith(raw) else 0):
                 yield topic, t_ns, data
+        yield from self.later
 
-    def _events(self) -> list[dict[str, Any]]:
-        found = (data for topic, _, data in self.recording.everything() if topic == layout.EVENTS)
-        return [{**json.loads(data), "data": data} for data in found]
 
-    def _kept_events(self) -> list[dict[str, Any]]:
-        return self._kept(self.recording.events())
+def left_in(recording: Recording[Any]) -> Earlier:
+    """What was completed in a recording: steps that ended, and whose samples are there to their end. What a killed process
+    had not written is not done.
 
-    def _kept(self, events: list[dict[str, Any]]) -> list[dict[str, Any]]:
-        """Events to the end of the last completed step, and later corrections of steps."""
-        last = max(
-            (k for k, e in enumerate(events) if e["kind"] == "step-end" and e["t_ns"] <= self.end_ns), default=-1
-        )
-        ended = {e["step"] for e in events[: last + 1] if e["kind"] == "step-end"}
-        later = (e for e in events[last + 1 :] if e["kind"] == "step-corrected" and e["step"] in ended)
-        return [*events[: last + 1], *later]
+    Raises:
+        RecordingError: it is damaged.
+    """
+    steps, events = _completed(recording), recording.events()
+    end_ns = steps[-1].end_ns if steps else 0
+    kept = 1 + max((k for k, e in enumerate(events) if e["kind"] == "step-end" and e["t_ns"] <= end_ns), default=-1)
+    ended = {e["step"] for e in events[:kept] if e["kind"] == "step-end"}
+    later = {k for k, e in enumerate(events) if k >= kept and e["kind"] == "step-corrected" and e["step"] in ended}
+    stored = enumerate(recording.stored_events()) if later else ()
+    return Earlier(
+        recording, steps, end_ns, _last(recording, end_ns),
+        1 + max((int(e["step"]) for e in events[:kept] if e["kind"] == "step-begin"), default=-1), kept,
+        tuple((layout.EVENTS, t_ns, data) for k, (t_ns, data) in stored if k in later),
+    )  # fmt: skip
+
+
+def _completed(recording: Recording[Any]) -> tuple[Step, ...]:
+    steps = recording.all_steps().items
+    if not steps:
+        return ()
+    reached = _reached(recording, steps[-1].start_ns) + 2 * recording.streams["telemetry"].period_ns
+    return tuple(s for s in steps if s.end_ns <= reached)
+
+
+def _reached(recording: Recording[Any], after_ns: int) -> int:
+    """Time of the last sample of the telemetry, which comes after this one, 0 where none does."""
+    return max((int(b.t_ns[-1]) for b in recording.blocks("telemetry", after_ns)), default=0)
+
+
+def _last(recording: Recording[Any], end_ns: int) -> int:
+    return max(end_ns, _reached(recording, end_ns), *(e["t_ns"] for e in recording.events()), 0)

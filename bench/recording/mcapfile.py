@@ -67,13 +67,13 @@ class McapFile:
                 if name == topic and start_ns <= t_ns < end_ns:
                     yield t_ns, data
 
-    def everything(self) -> Iterator[tuple[str, int, bytes]]:
-        """Topic, log time and data of every message, in file order; nothing is kept.
+    def everything(self, end_ns: int = 1 << 63) -> Iterator[tuple[str, int, bytes]]:
+        """Topic, log time and data of every message of the chunks that begin by then, in file order; nothing is kept.
 
         Raises:
             RecordingError: a chunk is damaged, or holds what cannot be right.
         """
-        for number in range(len(self.chunks)):
+        for number in np.flatnonzero(self._spans[0] <= end_ns).tolist():
             yield from self._read(number)
 
     @cached_property

@@ -130,7 +130,7 @@ def _moved(
         try:
             with supervisor.moving():
                 if job.earlier is not None:
-                    _take_over(job.earlier, recorder, rig.clock, progress)
+                    _take_over(job, job.earlier, recorder, rig.clock, progress)
                 live.attach(recorder)
                 if live.identity:
                     recorder.event(IDENTITY, said=dict(live.identity))
@@ -161,12 +161,12 @@ def _steps_to_do(job: Job) -> int:
     return planned if job.earlier is None or not planned else planned - len(job.earlier.steps) + 1
 
 
-def _take_over(earlier: Earlier, recorder: Recorder, clock: Clock, progress: Progress) -> None:
+def _take_over(job: Job, earlier: Earlier, recorder: Recorder, clock: Clock, progress: Progress) -> None:
     """What a stopped run recorded, while the rig's clock runs: heartbeats go on, and nothing of this run is recorded yet."""
     progress.stage(f"take over {len(earlier.steps)} completed steps")
     for _ in taking_over(recorder, earlier):
         clock.sleep(SLICE_S)
-        while recorder.waiting > MOST_WAITING:
+        while job.backend == "live" and recorder.waiting > MOST_WAITING:  # else the writer is waited for by itself
             clock.sleep(SLICE_S)
 
 

@@ -18,7 +18,7 @@ from bench.inputfile import parse_toml
 from bench.procedure import Procedure
 from bench.record.records import read_record
 from bench.recording import Recording, layout
-from bench.recording.earlier import Earlier
+from bench.recording.earlier import Earlier, left_in
 from bench.rigfile import RigFile
 from bench.run.continued import identity
 from bench.run.evaluation import TRUNCATED, Ending
@@ -62,8 +62,8 @@ def left_of(run: RunDirectory, recording: Recording[Any], procedure: Procedure) 
     Raises:
         ConfigError: it came to its end, or nothing was completed.
     """
-    earlier = Earlier(recording)
     try:
+        earlier = left_in(recording)
         ending = Ending.read(recording)
         done = [s for s in earlier.steps if s.kind == procedure.continues]
         if ending.stopped is None:

@@ -93,7 +93,7 @@ def fit(h: Hangings, p: Mapping[str, float], bias_A: float, masses: int, *, top_
     first one's K.
     """
     ip, i_n = _true_currents(h.currents, p, h.pull.keys)
-    design = _design(h, p, bias_A, masses, top_branch)
+    design = terms_of(h, p, bias_A, masses, top_branch=top_branch)
     solvers = np.linalg.pinv(design)
     applied = _applied_forces(h, p, masses)
     terms = np.einsum("bafp,bap->baf", solvers, applied)
@@ -105,11 +105,11 @@ def fit(h: Hangings, p: Mapping[str, float], bias_A: float, masses: int, *, top_
 
 def left_over(h: Hangings, f: Fit, p: Mapping[str, float], bias_A: float, masses: int) -> Array:
     """Residuals (K, A, P) in N that hangings leave by the terms of a fit, of these or of others at the same angles."""
-    design = _design(h, p, bias_A, masses, 1.0)
+    design = terms_of(h, p, bias_A, masses)
     return _referred(h, p, bias_A, masses, f.terms) - np.einsum("bapf,baf->bap", design, f.terms)
 
 
-def _design(h: Hangings, p: Mapping[str, float], bias_A: float, masses: int, top_branch: float) -> Array:
+def terms_of(h: Hangings, p: Mapping[str, float], bias_A: float, masses: int, *, top_branch: float = 1.0) -> Array:
     """What F_0, K, K2 and H are multiplied by, (K, A, P, 4)."""
     ip, i_n = _true_currents(h.currents, p, h.pull.keys)
     u = (ip**2 - i_n**2) / (4 * bias_A)

@@ -1,14 +1,14 @@
 """Drift between the halves of a calibration that was stopped and continued, by the hanging that is done in both.
 
 The same mass at the same angle asks for the same force. What the fit's terms make of the currents of both hangings, less what
-positions add, differs by d = r' - r; a hanging scatters (its strap seats anew, noise) by the covariance that the residuals
-of the other angles have, so that d has twice that variance. |d| beyond Student's t at CHANCE is a drift, told with its 95 %
-interval: of current or position sensors, of the magnets, or a hanger that hangs otherwise.
+positions add, differs by d = r' - r; a hanging scatters (its strap seats anew, noise) by the covariance that the fit's
+residuals have, freed of a step between the halves, so that d has twice that variance. |d| beyond Student's t at CHANCE is a
+drift, told with its 95 % interval: of current or position sensors, of the magnets, or a hanger that hangs otherwise.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,8 +19,7 @@ from bench.recording import Recording
 from bench.recording.earlier import AGAIN, CONTINUED
 from bench.recording.steps import Step, Steps
 from bench.uncertainty.coverage import coverage_factor
-from procedures.amb_calibration.fit import Fit, Hangings, left_over
-from procedures.amb_calibration.fit import fit as fitted
+from procedures.amb_calibration.fit import Fit, Hangings, left_over, terms_of
 from procedures.amb_calibration.plan import Plan
 from procedures.amb_calibration.pulls import Pull, pulls
 from procedures.amb_calibration.scatter import Scatter, scatter
@@ -73,9 +72,8 @@ def difference(
     count = len(plan.masses)
     changed = _with(h, at, again)
     moved = left_over(changed, f, p, plan.bias_A, count) - left_over(h, f, p, plan.bias_A, count)
-    one, axes = _scatter(h, f, p, plan, at[0]), range(len(f.terms))
-    place = (0 if one.covariance.shape[2] == 1 else at[0] % one.covariance.shape[2], at[1])
-    u = np.sqrt([2 * one.covariance[(b, b, *place)] for b in axes])
+    one, axes = _scatter(recording, data, f, p), range(len(f.terms))
+    u = np.sqrt([2 * one.covariance[(b, b, *at)] for b in axes])
     return Difference(*at, moved[(slice(None), *at)], u, float(one.dof))
 
 
@@ -120,19 +118,19 @@ def _with(h: Hangings, at: tuple[int, int], again: tuple[Array, Array, Array]) -
     return replace(h, currents=parts[0], positions=parts[1], motor_m=parts[2])
 
 
-def _scatter(h: Hangings, f: Fit, p: Mapping[str, float], plan: Plan, angle: int) -> Scatter:
-    """Of a hanging, by the other angles: a drift in the middle of one spoils its own residuals. By itself where it is the
-    only one."""
-    others = [a for a in range(len(h.angles)) if a != angle] or [angle]
-    rest = _at(h, others)
-    count = len(plan.masses)
-    return scatter(fitted(rest, p, plan.bias_A, count) if len(others) < len(h.angles) else f, rest, count)
-
-
-def _at(h: Hangings, chosen: Sequence[int]) -> Hangings:
-    """The hangings at some of the angles."""
-    keep = np.array(chosen)
-    return replace(
-        h, currents=h.currents[..., keep, :], positions=h.positions[..., keep, :], motor_m=h.motor_m[..., keep, :],
-        load=h.load[keep], branch=h.branch[keep], angles=h.angles[keep],
-    )  # fmt: skip
+def _scatter(recording: Recording[Plan], data: HangingData, f: Fit, p: Mapping[str, float]) -> Scatter:
+    """Of a hanging, freed of what drifted at a seam: there the zero of force may differ, by a term that the fit does not have,
+    so that a drift does not hide in the scatter that it makes. It takes a degree of freedom where a seam parts an angle."""
+    h, plan = data.hangings, recording.plan
+    start = data.table.start_ns
+    seams = [start > e["t_ns"] for e in recording.events(CONTINUED)]
+    parted = [after for after in seams if (after.any(axis=1) & ~after.all(axis=1)).any()]
+    design = terms_of(h, p, plan.bias_A, len(plan.masses))
+    after = (
+        np.stack([np.broadcast_to(one, design.shape[:-1]) for one in parted], axis=-1) if parted else design[..., :0]
+    )
+    wider = np.concatenate([design, after], axis=-1)
+    solvers = np.linalg.pinv(wider)
+    rest = f.forces - np.einsum("bapf,bafq,baq->bap", wider, solvers, f.forces)
+    found = scatter(replace(f, residuals=rest, solvers=solvers), h, len(plan.masses))
+    return replace(found, dof=found.dof - len(parted))

@@ -65,6 +65,7 @@ def hung_up_and_down(
             if number < again:
                 continue
             if number == again:
+                load = Load(str(done[again]["load"]))  # what really hung
                 _from_above(rig, plan, load, branch, hook)
             hanging = rig.operator.hang(replace(load, hook=hook))
             rig.clock.sleep(plan.settle_s)
