@@ -76,9 +76,14 @@ def test_what_a_person_said_later_of_a_step_is_taken_over(first: RunResult, tmp_
             super().step(text)
 
     recorders: list[Recorder] = []
+    made = Recorder.__init__
+
+    def noted(self: Recorder, *arguments: Any, **named: Any) -> None:
+        recorders.append(self)
+        made(self, *arguments, **named)
+
     with pytest.MonkeyPatch.context() as patch:
-        made = Recorder.__init__
-        patch.setattr(Recorder, "__init__", lambda self, *a, **k: (recorders.append(self), made(self, *a, **k))[1])
+        patch.setattr(Recorder, "__init__", noted)
         path = ran(CALIBRATION, tmp_path / "a", Correcting(DONE)).directory
     steps = opened(went_on(path, tmp_path / "b")).steps("hang")
     assert [s.labels["load"] for s in steps][:DONE] == ["", "M1", "M2", "M3", "M3"]
@@ -229,3 +234,12 @@ def test_findings_of_the_first_run_stay_with_its_steps(first: RunResult) -> None
     told = stopped.left_of(run, opened(first), load_procedure("amb-calibration")).told
     assert told["stopped"] == "operator-stop"
     assert "operator-stop" not in [f["code"] for f in told["findings"]]
+
+
+def test_differences_name_each_key() -> None:
+    then, now = {"a": {"b": 1, "c": 2}, "d": "x"}, {"a": {"b": 1, "c": 3}, "e": [1]}
+    assert list(stopped.differences(then, now)) == [
+        "a.c: found 3; the stopped run has 2",
+        "d: found none; the stopped run has 'x'",
+        "e: found [1]; the stopped run has none",
+    ]

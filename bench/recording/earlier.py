@@ -97,4 +97,4 @@ def _reached(recording: Recording[Any], after_ns: int) -> int:
 
 
 def _last(recording: Recording[Any], end_ns: int) -> int:
-    return max(end_ns, _reached(recording, end_ns), *(e["t_ns"] for e in recording.events()), 0)
+    return max((end_ns, _reached(recording, end_ns), *(int(e["t_ns"]) for e in recording.events())))

@@ -156,15 +156,10 @@ def encode_block(
     return b"".join(parts)
 
 
-def counts_of(topic: str, data: bytes) -> dict[str, tuple[str, int]]:
-    """What one of our messages adds to the counts of a recording: by kind of count, of which link or stream, and how much."""
-    if topic.startswith(raw_topic("")):
-        return {"frames": (topic.removeprefix(raw_topic("")), int.from_bytes(data[10:14], "little"))}
-    if topic.endswith("/block"):
-        stream = topic.removeprefix("/").removesuffix("/block")
-        _, _, _, count, _, lost, *_ = _HEAD_BYTES.unpack_from(data)
-        return {"samples": (stream, count), "lost": (stream, lost)}
-    return {"events": ("", 1)} if topic == EVENTS else {}
+def block_counts(data: bytes) -> tuple[int, int]:
+    """Samples of a block message of ours, and how many are lost before them."""
+    _, _, _, count, _, lost, *_ = _HEAD_BYTES.unpack_from(data)
+    return count, lost
 
 
 class ViewWindows:

@@ -13,7 +13,7 @@ import queue
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +26,7 @@ from bench.calibration.file import attached
 from bench.clock import Clock
 from bench.errors import RecordingError
 from bench.link.frames import FRAME, FrameBatch
-from bench.recording.layout import counts_of
+from bench.recording.integrity import Integrity
 from bench.recording.mcapwriter import McapWriter
 from bench.rigfile import RigFile
 from bench.rigfile.aliases import with_full_names
@@ -43,21 +43,6 @@ class RunHeader:
 
     metadata: Mapping[str, Mapping[str, str]]
     attachments: Mapping[str, bytes]
-
-
-@dataclass
-class Integrity:
-    """Counts at close: frames by link; samples, losses and blocks by stream. Only what was written is counted; `complete`
-    is false when a live queue overflowed, `overflows` times."""
-
-    frames: dict[str, int] = field(default_factory=dict)
-    samples: dict[str, int] = field(default_factory=dict)
-    lost: dict[str, int] = field(default_factory=dict)
-    blocks: dict[str, int] = field(default_factory=dict)
-    events: int = 0
-    steps: int = 0
-    overflows: int = 0
-    complete: bool = True
 
 
 class Recorder:
@@ -130,17 +115,13 @@ class Recorder:
         if len(batch):
             kept = batch if self._plain else batch.astype(FRAME, copy=True)  # written at once, or by the thread
             self._put("frames", link, lag_ns, kept)
-            _add(self.integrity.frames, link, len(batch))
+            self.integrity.add("frames", link, len(batch))
 
     def take(self, messages: Sequence[tuple[str, int, bytes]]) -> None:
         """Take messages of another recording over: topic, time and bytes (`bench.recording.takeover`)."""
         self._put("taken", messages)
         for topic, _, data in messages:
-            for kind, (name, count) in counts_of(topic, data).items():
-                if kind == "events":
-                    self.integrity.events += count
-                else:
-                    _add(getattr(self.integrity, kind), name, count)
+            self.integrity.count(topic, data)
 
     def go_on(self, begun: int, completed: tuple[tuple[str, Mapping[str, Any]], ...]) -> None:
         """What is recorded next comes after `begun` steps that were taken over, of which these were `completed`."""
@@ -177,8 +158,8 @@ class Recorder:
             self._put("samples", block)
             for name in self._watched if self._watched.keys() <= {TICKS, *block.columns} else ():
                 self._watched[name].append(np.array(block.ticks if name == TICKS else block.columns[name], np.float64))
-            _add(self.integrity.samples, block.stream, len(block))
-            _add(self.integrity.lost, block.stream, block.lost_before)
+            self.integrity.add("samples", block.stream, len(block))
+            self.integrity.add("lost", block.stream, block.lost_before)
 
     def event(self, kind: str, t_ns: int | None = None, **data: Any) -> int:
         """Record something that happened, at `t_ns` or now; `data` are JSON values. The time, ns."""
@@ -313,7 +294,3 @@ def _why(failure: BaseException) -> str:
     full = isinstance(failure, OSError) and failure.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
     why = getattr(failure, "strerror", None) or repr(failure)
     return f"{why}. Next: free space there, or give another --out" if full else why
-
-
-def _add(counts: dict[str, int], name: str, count: int) -> None:
-    counts[name] = counts.get(name, 0) + count

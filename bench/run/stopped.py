@@ -42,18 +42,21 @@ def opened(run: RunDirectory) -> Recording[Any]:
             f"{run.path}: holds no recording.mcap; expected one. The run ended before it could record{NOTHING} "
             "Next: run it anew"
         )
-    if lock.is_held(run.recording):
-        raise ConfigError(
-            f"{run.path}: this run is still being written; expected one that was stopped{NOTHING} Next: wait for its end, or "
-            "stop it"
-        )
     try:
+        if lock.is_held(run.recording):
+            raise ConfigError(
+                f"{run.path}: this run is still being written; expected one that was stopped{NOTHING} Next: wait for its end, "
+                "or stop it"
+            )
         found: Recording[Any] = Recording.open(run.recording)
-        if found.version != layout.VERSION:
-            raise RecordingError(f"layout version: found {found.version}; expected {layout.VERSION}. Next: run it anew")
-        return found
-    except RecordingError as error:
+    except (RecordingError, OSError) as error:
         raise ConfigError(f"{run.path}: cannot be continued{NOTHING} {error}") from error
+    if found.version != layout.VERSION:
+        raise ConfigError(
+            f"{run.path}: recorded by an older Levbench: layout version: found {found.version}; expected {layout.VERSION}"
+            f"{NOTHING} Next: run it anew"
+        )
+    return found
 
 
 def left_of(run: RunDirectory, recording: Recording[Any], procedure: Procedure) -> Earlier:

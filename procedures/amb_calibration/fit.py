@@ -106,7 +106,8 @@ def fit(h: Hangings, p: Mapping[str, float], bias_A: float, masses: int, *, top_
 def left_over(h: Hangings, f: Fit, p: Mapping[str, float], bias_A: float, masses: int) -> Array:
     """Residuals (K, A, P) in N that hangings leave by the terms of a fit, of these or of others at the same angles."""
     design = terms_of(h, p, bias_A, masses)
-    return _referred(h, p, bias_A, masses, f.terms) - np.einsum("bapf,baf->bap", design, f.terms)
+    out: Array = _referred(h, p, bias_A, masses, f.terms) - np.einsum("bapf,baf->bap", design, f.terms)
+    return out
 
 
 def terms_of(h: Hangings, p: Mapping[str, float], bias_A: float, masses: int, *, top_branch: float = 1.0) -> Array:
@@ -115,13 +116,15 @@ def terms_of(h: Hangings, p: Mapping[str, float], bias_A: float, masses: int, *,
     u = (ip**2 - i_n**2) / (4 * bias_A)
     v = (ip**2 + i_n**2) / 2 - bias_A**2
     branch = np.where(h.load == masses - 1, top_branch, h.branch)
-    return np.stack([np.ones_like(u), u, v, np.broadcast_to(branch, u.shape)], axis=-1)
+    out: Array = np.stack([np.ones_like(u), u, v, np.broadcast_to(branch, u.shape)], axis=-1)
+    return out
 
 
 def _referred(h: Hangings, p: Mapping[str, float], bias_A: float, masses: int, terms: Array) -> Array:
     """Forces (K, A, P) in N referred to the sensors' zero, by the K of the `terms`."""
     stiffness = terms[:, :, 1].mean(axis=1) * bias_A / np.array([gap(plane, p) for plane in h.pull.planes])
-    return _applied_forces(h, p, masses) + _motor_forces(h, p) - stiffness[:, None, None] * h.positions
+    out: Array = _applied_forces(h, p, masses) + _motor_forces(h, p) - stiffness[:, None, None] * h.positions
+    return out
 
 
 def _true_currents(currents: Array, p: Mapping[str, float], keys: tuple[str, ...]) -> tuple[Array, Array]:

@@ -74,7 +74,7 @@ def difference(
     moved = left_over(changed, f, p, plan.bias_A, count) - left_over(h, f, p, plan.bias_A, count)
     one, axes = _scatter(recording, data, f, p), range(len(f.terms))
     u = np.sqrt([2 * one.covariance[(b, b, *at)] for b in axes])
-    return Difference(*at, moved[(slice(None), *at)], u, float(one.dof))
+    return Difference(at[0], at[1], moved[(slice(None), *at)], u, float(one.dof))
 
 
 def _drifts(found: Difference, data: HangingData, f: Fit) -> Iterator[Finding]:
