@@ -15,7 +15,7 @@ import argparse
 import json
 import tempfile
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,18 +23,16 @@ import numpy as np
 
 from bench.campaign.bands import Sample, coverage
 from bench.cli.loading import load_procedure
-from bench.cli.virtual import flown
+from bench.cli.virtual import Simulated, flown
 from bench.errors import OperatorAbort
 from bench.findings import Effect, Finding
 from bench.procedure import Measured
 from bench.progress import Silent
 from bench.record.outcomes import Outcome
-from bench.recording import Recording
-from bench.rigfile import load_rig
 from bench.run import stopped
 from bench.rundir import RunDirectory
 from bench.uncertainty import interval
-from sim_backend.truth import draw
+from sim_backend.machine import Truth
 
 PROCEDURE, RIG, STEPS = "amb-calibration", "tsbs12", 60
 PLAN: Mapping[str, Any] = {"angles": 8, "settle_s": 0.3, "average_s": 0.2}
@@ -59,39 +57,40 @@ class Stopping(Silent):
             raise OperatorAbort(f"stopped before {text}")
 
 
-def run(seed: int, changes: Mapping[str, float]) -> dict[str, Any]:
-    """Stop a calibration of a rig, continue it on the machine with some values changed; what that measured."""
+def runs(seed: int, wanted: Sequence[Mapping[str, float]]) -> Iterator[dict[str, Any]]:
+    """Stop a calibration of a rig, and continue it once for each of the changes of its machine; what that measured."""
     with tempfile.TemporaryDirectory() as folder:
-        first, second = (RunDirectory(Path(folder) / name) for name in ("first", "second"))
+        first = RunDirectory(Path(folder) / "first")
         first.path.mkdir()
-        second.path.mkdir()
         half = flown(PROCEDURE, RIG, seed, PLAN, first.recording, progress=Stopping())
         assert half.machine.ending.stopped is Outcome.ABORTED
-        earlier = stopped.left_of(first, stopped.opened(first), load_procedure(PROCEDURE))
-        assert len(earlier.steps) == STEPS
-        drawn = draw(load_rig(RIG), seed)
-        known = {**drawn.values, **drawn.defects}
-        moved = {name: known[name] + by for name, by in changes.items()}
-        whole = flown(PROCEDURE, RIG, seed, PLAN, second.recording, moved, earlier=earlier)
-        assert whole.machine.cause is None
-        done = whole.analysed()
-        values = {}
-        for m in (r for r in done.results if isinstance(r, Measured)):
-            found = interval(m.estimate, seed)
-            name = m.quantity.name + (f"_{m.where[0]}" if m.where else "")
-            values[name] = {"value": m.estimate.value, "low": found.low, "high": found.high, "U": found.U,
-                            "truth": half.drawn.quantities[name]}  # fmt: skip
-        told = [(f.code, f.effect.value) for f in done.results if isinstance(f, Finding)]
-        assert isinstance(done.recording, Recording)
-    return {"seed": seed, "changes": dict(changes), "values": values, "findings": told}
+        for number, changes in enumerate(wanted):
+            earlier = stopped.left_of(first, stopped.opened(first), load_procedure(PROCEDURE))
+            assert len(earlier.steps) == STEPS
+            moved = {name: half.drawn.values[name] + by for name, by in changes.items()}
+            path = Path(folder) / f"{number}.mcap"
+            whole = flown(PROCEDURE, RIG, seed, PLAN, path, moved, earlier=earlier)
+            assert whole.machine.cause is None
+            done = whole.analysed()
+            path.unlink()
+            told = [(f.code, f.effect.value) for f in done.results if isinstance(f, Finding)]
+            yield {"seed": seed, "changes": dict(changes), "values": values(done, half.drawn), "findings": told}
 
 
-def asked(first: int, count: int, plants: bool) -> Iterator[tuple[int, dict[str, float]]]:
-    """Seeds, and what changes."""
-    for seed in range(first, first + count):
-        yield seed, {}
-        if plants:
-            yield from ((seed, {name: size}) for name, sizes in PLANTS.items() for size in sizes)
+def values(done: Simulated, drawn: Truth) -> dict[str, dict[str, float]]:
+    """Values, bounds of their intervals and truths by quantity."""
+    out = {}
+    for m in (r for r in done.results if isinstance(r, Measured)):
+        found = interval(m.estimate, drawn.seed)
+        name = m.quantity.name + (f"_{m.where[0]}" if m.where else "")
+        out[name] = {"value": m.estimate.value, "low": found.low, "high": found.high, "U": found.U,
+                     "truth": drawn.quantities[name]}  # fmt: skip
+    return out
+
+
+def asked(plants: bool) -> list[dict[str, float]]:
+    """What changes while a machine is off: nothing first."""
+    return [{}, *({name: size} for name, sizes in PLANTS.items() if plants for size in sizes)]
 
 
 def lines(path: Path) -> list[dict[str, Any]]:
@@ -137,11 +136,12 @@ def main() -> None:
     if not chosen.report:
         chosen.file.parent.mkdir(parents=True, exist_ok=True)
         known = {(d["seed"], *d["changes"].items()) for d in done}
-        for seed, changes in asked(chosen.first, chosen.count, chosen.plants):
-            if (seed, *changes.items()) not in known:
-                done.append(run(seed, changes))
+        for seed in range(chosen.first, chosen.first + chosen.count):
+            left = [changes for changes in asked(chosen.plants) if (seed, *changes.items()) not in known]
+            for line in runs(seed, left) if left else ():
+                done.append(line)
                 with chosen.file.open("a") as file:
-                    file.write(json.dumps(done[-1]) + "\n")
+                    file.write(json.dumps(line) + "\n")
     report(done)
 
 

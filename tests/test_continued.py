@@ -89,6 +89,15 @@ def test_what_a_person_said_later_of_a_step_is_taken_over(first: RunResult, tmp_
     assert [s.labels["load"] for s in steps][:DONE] == ["", "M1", "M2", "M3", "M3"]
 
 
+def test_what_was_reached_by_unloading_is_reached_so_again(tmp_path: Path) -> None:
+    """The exercise of every run first; then from the heaviest mass down to the one that is done again, and on."""
+    path = stopped_after(6, tmp_path / "a").directory
+    events = opened(went_on(path, tmp_path / "b")).events()
+    seam = next(k for k, e in enumerate(events) if e["kind"] == "continued")
+    hung = [e["load"] for e in events[seam:] if e["kind"] == "operator" and e["action"] == "hang"]
+    assert hung == ["M4", "", "M4", "M3", "M2", "M1", ""]
+
+
 def test_what_was_recorded_is_taken_over_byte_by_byte(first: RunResult, second: RunResult) -> None:
     """Every message of the first recording to the end of its last step, and nothing of how it was stopped."""
     end = opened(first).all_steps().items[-1].end_ns
