@@ -1,4 +1,4 @@
-"""One bench per rig: a lock on a file, which the kernel frees with the process however that ends.
+"""One bench per rig, one writer of a recording: a lock on a file, which the kernel frees with the process however that ends.
 
 The file's text names the owner and the start, for the message that a second bench gives. The file itself stays: to
 remove it would let two processes hold "the" lock on different files.
@@ -55,6 +55,24 @@ def rig_lock(rig: str, directory: Path | None = None) -> Iterator[Path]:
         os.ftruncate(descriptor, 0)
         os.write(descriptor, _owner().encode()[:TEXT_LIMIT])
         yield path
+    finally:
+        os.close(descriptor)
+
+
+def hold(descriptor: int) -> None:
+    """Hold a file that is being written until it is closed or the process ends; `is_held` says so to others."""
+    _try_lock(descriptor)
+
+
+def is_held(path: Path) -> bool:
+    """Whether a process holds a file.
+
+    Raises:
+        OSError: it cannot be opened.
+    """
+    descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_CLOEXEC", 0))
+    try:
+        return not _try_lock(descriptor)
     finally:
         os.close(descriptor)
 

@@ -44,6 +44,10 @@ class RunDirectory:
         return self.path / "run.log"
 
     @property
+    def asked(self) -> Path:
+        return self.path / "asked.json"
+
+    @property
     def analyses(self) -> Path:
         return self.path / "analyses"
 

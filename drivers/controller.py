@@ -49,7 +49,7 @@ class Controller:
             rig, link, self.telemetry, session.number, base.now_ns, max(waiting.STALL_NS, round(2e9 * slice_s))
         )
         self.cleared, self.restored = "", tuple[str, ...]()
-        self.serial: int | None = None
+        self.identity: dict[str, float] = {}  # what it says that it is
         self.owned = False  # until then heartbeats mean nothing, and would alarm its owner
         self.sight = Sight(rig, self.telemetry, lambda: self.mode, base.now_ns)
         self.cut_ns = 0  # the most that a step lacked of its telemetry when it was left
@@ -100,8 +100,8 @@ class Controller:
         ))  # fmt: skip
         handshake.claim(self.requests, self.rig, self._session, self.clock, self._wait)
         self._own()
-        self.serial = handshake.identify(self.requests, self.rig, self._session, self._wait)
-        self.watch.simulated |= self.serial == 0
+        self.identity = handshake.identify(self.requests, self.rig, self._session, self._wait)
+        self.watch.simulated |= self.identity.get("serial") == 0
         if self.mode == "FAULT":
             advice.may_clear("controller", self.fault, clear_fault)
             self.cleared = self.fault

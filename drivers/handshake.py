@@ -38,11 +38,12 @@ def claim(dialogue: Dialogue, rig: RigFile, session: Session, clock: Clock, wait
         clock.sleep(0.1)
 
 
-def identify(dialogue: Dialogue, rig: RigFile, session: Session, wait: Wait) -> int | None:
+def identify(dialogue: Dialogue, rig: RigFile, session: Session, wait: Wait) -> dict[str, float]:
     """Compare the controller's protocol and message map with the rig file's.
 
     Returns:
-        Its serial number, 0 of a simulated controller; None of one that is not asked.
+        What it says that it is, by the names of its Identity: a `serial` of 0 is a simulated controller's. Nothing of one that
+        is not asked.
 
     Raises:
         ConfigError: they differ.
@@ -51,7 +52,7 @@ def identify(dialogue: Dialogue, rig: RigFile, session: Session, wait: Wait) -> 
     device = rig.devices["controller"]
     stated = {"protocol": device.protocol, "map_version": device.map_version}
     if not dialogue.has("Identity") or stated == {"protocol": None, "map_version": None}:
-        return None
+        return {}
     values = {"session": session.number, "code": rig.messages.code("Command", "code", "IDENTIFY")}
     found = dialogue.ask("Command", values, "Identity", "the controller's Identity", wait)
     for key, expected in stated.items():
@@ -60,7 +61,7 @@ def identify(dialogue: Dialogue, rig: RigFile, session: Session, wait: Wait) -> 
                 f"the controller says {key} {found[key]:g}; rig file {rig.path}: devices.controller.{key}: expected "
                 f"{expected}. Next: use the DBC and rig file of this firmware, or update the firmware"
             )
-    return int(found["serial"]) if "serial" in found else None
+    return {name: float(value) for name, value in found.items() if name not in ("token", "session")}
 
 
 def alone(others: Collection[str], link: str) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from bench.figures import Sheet
@@ -113,7 +113,7 @@ def view_of(record: Content, around: Surroundings, shown: Sequence[Drawn | Sheet
         correlations=tables.correlations(record, around.titles),
         plan=tuple(tables.settings(record.get("plan") or {})),
         versions=tuple(tables.facts(record.get("versions") or {})),
-        recording=_recording(record.get("recording")),
+        recording=(*_recording(record.get("recording")), *_continued(record.get("continues"))),
         end=f"End of report {record.get('run_id') or ''}".rstrip(),
     )
 
@@ -237,6 +237,15 @@ def _recording(recording: Any) -> tuple[Fact, ...]:
         Fact("File", str(recording.get("file") or text.DASH)),
         Fact("SHA-256", str(recording["sha256"])),
     )
+
+
+def _continued(runs: Any) -> Iterator[Fact]:
+    """The stopped runs whose steps the recording took over."""
+    for run in runs if isinstance(runs, list | tuple) else ():
+        if isinstance(run, Mapping):
+            steps, stopped = run.get("steps", text.DASH), run.get("stopped", text.DASH)
+            yield Fact("Goes on with", f"{run.get('run_id', text.DASH)}: its first {steps} steps, stopped by {stopped}")
+            yield Fact("SHA-256 of that recording", str(run.get("sha256", text.DASH)))
 
 
 def _paragraphs(method: str) -> tuple[str, ...]:

@@ -1,6 +1,7 @@
 """Draws: every one has a name and its own stream, a hash of seed and name, so that adding one leaves the others.
 
 What a machine is depends on its seed; what another day brings depends on the visit too. Visit 0 hashes as if there were none.
+What is drawn each time anew, noise and what hands do, is so too in each `stretch` of a run that was stopped and continued.
 """
 
 from __future__ import annotations
@@ -18,9 +19,15 @@ def uniform(seed: int, name: str, visit: int = 0) -> float:
     return (int.from_bytes(_digest(seed, name, visit)[:7], "little") + 0.5) / 2**56
 
 
-def noise_seed(seed: int, visit: int) -> int:
+def noise_seed(seed: int, visit: int, stretch: int = 0) -> int:
     """What all noise of a visit counts from: the seed itself on visit 0, else a number of 64 bits."""
-    return int.from_bytes(_digest(seed, "noise", visit)[:8], "little") if visit else seed
+    name = in_stretch("noise", stretch)
+    return int.from_bytes(_digest(seed, name, visit)[:8], "little") if visit or stretch else seed
+
+
+def in_stretch(name: str, stretch: int) -> str:
+    """The name of what is drawn anew in each stretch of a run; that of the first is the name itself."""
+    return f"{name}/{stretch}" if stretch else name
 
 
 def draw_one(t: Toleranced, seed: int, name: str, visit: int = 0) -> float:

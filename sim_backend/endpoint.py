@@ -32,18 +32,25 @@ class SimulatedRig:
         session: of its heartbeat.
         faults: of its controller and of its link (`bench.link.fault_injection`); the truth's noise says which frames they hit.
         substeps: integration steps of the plant in a tick.
+        start_ns: when it is switched on.
     """
 
     def __init__(
-        self, rig: RigFile, truth: Truth, session: int = 1, faults: Sequence[Fault] = (), substeps: int = 2
+        self,
+        rig: RigFile,
+        truth: Truth,
+        session: int = 1,
+        faults: Sequence[Fault] = (),
+        substeps: int = 2,
+        start_ns: int = EPOCH_NS,
     ) -> None:
         on_link, in_device = divided(faults, simulated=True)
         if truth.machine.controller is not None:
             on_link, in_device = of_a_line(on_link, in_device)
         self.device = (truth.machine.controller or SimulatedController)(rig, truth, in_device, substeps)
         self.truth = truth
+        self._now = start_ns
         self.link = InProcessLink(rig, self, session, on_link)
-        self._now = EPOCH_NS
         self._operator = truth.machine.operator(rig, self.device.plant, truth)
 
     def now_ns(self) -> int:
@@ -76,7 +83,7 @@ class InProcessLink:
         self._queued: list[FrameBatch] = []
         self._arrived: list[FrameBatch] = []
         self._lease_until = 0
-        self._next_beat = EPOCH_NS
+        self._next_beat = self._begun = clock.now_ns()
         self._counter = 0
         self._dead_after = clock.truth.defects["dead_after_s"]
         self.name = rig.devices["controller"].link
@@ -92,7 +99,7 @@ class InProcessLink:
 
     @property
     def _dead(self) -> bool:
-        return bool(self._dead_after) and self._clock.now_ns() - EPOCH_NS > self._dead_after * 1e9
+        return bool(self._dead_after) and self._clock.now_ns() - self._begun > self._dead_after * 1e9
 
     @property
     def reopening(self) -> bool:

@@ -13,7 +13,7 @@ from bench.link.fault_injection import Fault
 from bench.rigfile import RigFile
 from bench.rigfile.toleranced import Toleranced
 from sim_backend.core import PERIOD_TICKS, TICK_S, DriveLaw
-from sim_backend.draws import noise_seed
+from sim_backend.draws import in_stretch, noise_seed
 from sim_backend.motion import NONE, Motions
 
 Array = npt.NDArray[np.float64]
@@ -133,7 +133,9 @@ class Machine:
 
 @dataclass(frozen=True)
 class Truth:
-    """Every drawn value by name, planted defects, and what follows from them. `seed` says which machine, `visit` which day.
+    """Every drawn value by name, planted defects, and what follows from them. `seed` says which machine, `visit` which day,
+    `stretch` how often its run had been stopped and
+    continued.
     `seen`: axis and true place, m or rad, of each reading of an instrument outside the loop, in their order."""
 
     seed: int
@@ -143,12 +145,17 @@ class Truth:
     quantities: Mapping[str, float]
     machine: Machine
     visit: int = 0
+    stretch: int = 0
     seen: list[tuple[str, float]] = field(default_factory=list, compare=False, repr=False)
 
     @property
     def noise(self) -> int:
         """Seed of all noise: of the plant, and of which frames a fault hits."""
-        return noise_seed(self.seed, self.visit)
+        return noise_seed(self.seed, self.visit, self.stretch)
+
+    def anew(self, name: str) -> str:
+        """The name of a draw that is made each time anew: a seat, a weight, a reading."""
+        return in_stretch(name, self.stretch)
 
     def planted(self, device: str = "") -> dict[str, float]:
         """What channels, or registers of a device, tell for PLANTED_S from when the shaft is held first, whatever they read;
@@ -161,7 +168,7 @@ class Truth:
         """As `truth.json` has it."""
         return {
             "schema": 1, "seed": self.seed, "visit": self.visit, "quantities": dict(self.quantities),
-            "values": dict(self.values), "defects": dict(self.defects),
+            "values": dict(self.values), "defects": dict(self.defects), **({"stretch": self.stretch} if self.stretch else {}),
         }  # fmt: skip
 
     @property

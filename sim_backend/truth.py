@@ -25,10 +25,11 @@ def draw(
     settings: Mapping[str, float] | None = None,
     *,
     visit: int = 0,
+    stretch: int = 0,
 ) -> Truth:
     """Draw a rig. `overrides` set drawn values or defects by name, or the truth of the machine's `targets` directly.
     `settings` are the controller parameters that a procedure will write: the measurands hold for the bias among them. Another
-    `visit` is the same machine on another day.
+    `visit` is the same machine on another day, another `stretch` a run on it that was stopped and goes on.
 
     Raises:
         ConfigError: an override names nothing, or no machine can be made of the rig file.
@@ -58,7 +59,7 @@ def draw(
     for name, value in targets.items():
         values[machine.targets[name]] *= value / machine.quantities(machine.params(values, defects), used)[name]
     plant = machine.params(values, defects)
-    return Truth(seed, values, defects, plant, machine.quantities(plant, used), machine, visit)
+    return Truth(seed, values, defects, plant, machine.quantities(plant, used), machine, visit, stretch)
 
 
 def nominal(rig: RigFile) -> Mapping[str, float]:

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from bench.link.frames import FD, SENT, FrameBatch, frame
-from bench.recording.recorder import Integrity, Recorder, RunHeader
+from bench.recording.integrity import Integrity
+from bench.recording.recorder import Recorder, RunHeader
 from bench.samples import ChannelInfo, SampleBlock, StreamLayout
 
 START_NS = 1_767_225_600 * 10**9

@@ -98,9 +98,9 @@ def check(
 def run(
     procedure: Annotated[
         str, typer.Argument(metavar="PROCEDURE", help="A name that `bench list` shows, or a file that holds one.")
-    ],
-    rig: o.RigOption,
-    backend: Annotated[o.Backend, typer.Option(help="The simulated rig, or the real one.")] = o.Backend.SIM,
+    ] = "",
+    rig: o.RigOption = "",
+    backend: Annotated[o.Backend | None, typer.Option(help="The simulated rig (default), or the real one.")] = None,
     seed: o.Seed = None,
     visit: o.Visit = None,
     plan: o.Plans = None,
@@ -116,17 +116,19 @@ def run(
     allow_expired: o.AllowExpired = False,
     spec: o.Spec = None,
     require_verdict: o.RequireVerdict = False,
+    go_on: o.GoOn = None,
     verbose: o.Verbose = False,
 ) -> int:
-    """Run a procedure on a rig. The last line on standard output is the run directory."""
+    """Run a procedure on a rig, or go on with a run that was stopped. The last line on standard output is the run directory."""
     from bench.cli.compose import Request
     from bench.cli.run import run_command
 
+    named = backend.value if backend else "" if go_on else "sim"
     asked = Request(
-        procedure=procedure, rig=rig, backend=backend.value, seed=seed, visit=visit, links=tuple(link or ()),
+        procedure=procedure, rig=rig, backend=named, seed=seed, visit=visit, links=tuple(link or ()),
         plan=tuple(plan or ()), plan_file=plan_file, truth=tuple(truth or ()), faults=tuple(fault or ()),
         clear_fault=clear_fault, out=out, operator=operator.value if operator else None, report=not no_report,
-        calibrations=calibrations, allow_expired=allow_expired, spec=spec, require_verdict=require_verdict,
+        calibrations=calibrations, allow_expired=allow_expired, spec=spec, require_verdict=require_verdict, continues=go_on,
     )  # fmt: skip
     return run_command(asked, verbose)
 

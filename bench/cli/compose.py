@@ -11,68 +11,60 @@ import importlib
 import shlex
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 from bench.calibration import Need, number
 from bench.calibration.lookup import Lookup
 from bench.calibration.store import Store
+from bench.cli import continuing
 from bench.cli.console import Asking, quietly
 from bench.cli.loading import load_procedure
 from bench.cli.opening import live, simulated
+from bench.cli.request import Request
 from bench.errors import ConfigError
 from bench.link import fault_injection
 from bench.lock import rig_lock
 from bench.procedure import BenchPlan, Procedure, plans
 from bench.record.specs import load_spec, misnamed
+from bench.recording.earlier import Earlier
 from bench.rigfile import RigFile, linkurl, load_rig
 from bench.rigfile.envelope import Envelope
+from bench.run import stopped
 from bench.run.job import Connect, Job
 
+__all__ = ["Request", "planned", "prepare", "simulated", "with_links"]
 NUMERICS = ("fft", "interpolate", "linalg", "ndimage", "optimize", "signal", "special")
 
 
-@dataclass(frozen=True)
-class Request:
-    """A run as it was asked for."""
-
-    procedure: str
-    rig: str
-    backend: str = "sim"
-    seed: int | None = None
-    visit: int | None = None
-    plan: tuple[str, ...] = ()
-    plan_file: Path | None = None
-    truth: tuple[str, ...] = ()
-    links: tuple[str, ...] = ()
-    faults: tuple[str, ...] = ()
-    clear_fault: bool = False
-    out: Path = Path("runs")
-    operator: str | None = None
-    report: bool = True
-    calibrations: Path | None = None
-    allow_expired: bool = False
-    spec: Path | None = None
-    require_verdict: bool = False
-
-
-def planned(request: Request) -> tuple[Procedure, RigFile, BenchPlan]:
-    """The procedure, the rig, and the plan, of which the rig can do what it asks.
+def planned(request: Request, earlier: Earlier | None = None) -> tuple[Procedure, RigFile, BenchPlan]:
+    """The procedure, the rig, and the plan, of which the rig can do what it asks; rig and plan of a stopped run, if it is
+    one that goes on.
 
     Raises:
         ConfigError: usage, rig file or plan; every problem of the first of them that has one.
     """
+    if not (request.procedure and request.rig):
+        raise ConfigError(
+            "bench run: expected PROCEDURE and --rig RIG, or --continue RUN. Next: `bench list` shows both"
+        )
     _refuse_mixed_backends(request)
     procedure = load_procedure(request.procedure)
     rig = with_links(load_rig(request.rig), request.links)
+    if earlier is not None:
+        stopped.require_same_rig(earlier.recording, rig)
     procedure = procedure.on(rig)
     if lacking := procedure.lacking(rig):
         raise ConfigError("\n  ".join([f"{rig.name} cannot run {procedure.name}; nothing was started:", *lacking]))
     defaults = (f"{rig.path} [plans.{procedure.name}]", rig.plans.get(procedure.name, {}))
-    plan = plans.assemble(procedure.plan, defaults, request.plan_file, request.plan)
+    if earlier is None or request.plan or request.plan_file is not None:
+        plan = plans.assemble(procedure.plan, defaults, request.plan_file, request.plan)
+    else:
+        plan = earlier.recording.plan_as(procedure.plan)
+    if earlier is not None:
+        stopped.require_same_plan(earlier.recording, plan.model_dump(mode="json"))
     problems = [*procedure.check(rig, plan), *Envelope(rig).problems_of(dict(procedure.settings(rig, plan)))]
     if problems:
         raise ConfigError("\n  ".join(["the plan does not fit the rig; nothing was started:", *problems]))
@@ -85,6 +77,8 @@ def prepare(request: Request, asking: Asking = quietly) -> tuple[Job, Connect]:
     Raises:
         ConfigError: usage, rig file, plan, spec or calibrations; every problem of the first of them that has one.
     """
+    if request.continues is not None:
+        return _going_on(*continuing.resolved(request, request.continues), asking)
     procedure, rig, plan = planned(request)
     if unknown := tuple(misnamed(rig.name, file=request.spec)):
         raise ConfigError("the spec cannot be used; nothing was started:", unknown)
@@ -100,20 +94,37 @@ def prepare(request: Request, asking: Asking = quietly) -> tuple[Job, Connect]:
     )
     used = lookup.found(procedure.name, procedure.needs(plan))
     procedure.refuse_by(rig, plan, used)
-    injected = [fault_injection.parse(text) for text in request.faults]
-    if seed is None:
+    return _job(request, Job(procedure, rig, plan, limits, request.backend, seed, None, used, judged), asking)
+
+
+def _going_on(request: Request, earlier: Earlier, asking: Asking) -> tuple[Job, Connect]:
+    """As `prepare`, for a run that goes on with what a stopped one left."""
+    procedure, rig, plan = planned(request, earlier)
+    limits, used, judged = continuing.as_stored(earlier)
+    job = Job(procedure, rig, plan, limits, request.backend, request.seed, None, used, judged, earlier=earlier)
+    return _job(request, job, asking)
+
+
+def _job(request: Request, job: Job, asking: Asking) -> tuple[Job, Connect]:
+    """The job with its lock, and how its rig is opened."""
+    rig, injected = job.rig, [fault_injection.parse(text) for text in request.faults]
+    if job.procedure.continues:
+        job = replace(job, asked=continuing.asked(request, rig))
+    if job.seed is None:
         _load_numerics()
         kind = request.operator or ("console" if sys.stdin.isatty() else "auto")
-        job = Job(procedure, rig, plan, limits, "live", None, rig_lock(rig.link.url.partition("?")[0]), used,
-                  judged)  # fmt: skip
+        job = replace(job, lock=rig_lock(rig.link.url.partition("?")[0]))
         return job, live(rig, kind, injected, request.clear_fault, asking)
     overrides = dict(plans.assignment(text) for text in request.truth)
     _refuse_words(overrides)
     visit = request.visit or 0
+    settings = job.procedure.settings(rig, job.plan)
+    again = {} if job.earlier is None else {
+        "stretch": job.earlier.stretch, "start_ns": continuing.switched_on_ns(job.earlier)}  # fmt: skip
     connect = simulated(
-        rig, seed, overrides, request.operator or "auto", procedure.settings(rig, plan), injected, asking, visit=visit
+        rig, job.seed, overrides, request.operator or "auto", settings, injected, asking, visit=visit, **again
     )
-    return Job(procedure, rig, plan, limits, request.backend, seed, None, used, judged, visit), connect
+    return replace(job, visit=visit), connect
 
 
 def _load_numerics() -> None:

@@ -54,6 +54,8 @@ def simulated(
     asking: console.Asking = console.quietly,
     *,
     visit: int = 0,
+    stretch: int = 0,
+    start_ns: int | None = None,
 ) -> Connect:
     """How to open a simulated rig. The truth is drawn now, so that a wrong override is found before the start.
 
@@ -62,20 +64,22 @@ def simulated(
     """
     from sim_backend.truth import draw
 
-    return of_truth(rig, draw(rig, seed, overrides, settings, visit=visit), operator, injected, asking)
+    drawn = draw(rig, seed, overrides, settings, visit=visit, stretch=stretch)
+    return of_truth(rig, drawn, operator, injected, asking, start_ns=start_ns)
 
 
 def of_truth(
     rig: RigFile, truth: Truth, operator: str, injected: Sequence[Fault] = (), asking: console.Asking = console.quietly,
-    *, substeps: int = SUBSTEPS, slice_s: float = SLICE_S,
+    *, substeps: int = SUBSTEPS, slice_s: float = SLICE_S, start_ns: int | None = None,
 ) -> Connect:  # fmt: skip
     """How to open the simulated rig of a truth.
 
     Args:
         substeps: integration steps of the plant in a tick.
         slice_s: the longest sleep in one piece; links, envelope and supervisor are looked at after each.
+        start_ns: when it is switched on; the simulation's epoch by default.
     """
-    from sim_backend.endpoint import SimulatedRig
+    from sim_backend.endpoint import EPOCH_NS, SimulatedRig
 
     @contextmanager
     def connect(supervisor: Supervisor) -> Iterator[OpenRig]:
@@ -84,7 +88,7 @@ def of_truth(
         from drivers.operator import LineOperator
         from sim_backend.devices.registers import Followed, RegisterBank
 
-        machine = SimulatedRig(rig, truth, SIMULATED.number, injected, substeps)
+        machine = SimulatedRig(rig, truth, SIMULATED.number, injected, substeps, start_ns or EPOCH_NS)
         bank = RegisterBank(rig, truth, machine.device.plant)
         base = WatchedClock(Followed(machine, bank), machine.link.renew_lease, supervisor.check)
         controller = Controller(rig, machine.link, base, SIMULATED, slice_s)
@@ -291,4 +295,6 @@ def _opened(
     steps, aftermath = (
         making_safe(controller, base, bus.drive) if controller.stage is None else making_stage_safe(controller, base)
     )
-    return OpenRig(rig, streams, attach, unguard, steps, truth, found, controller.catch_up, aftermath)
+    return OpenRig(
+        rig, streams, attach, unguard, steps, truth, found, controller.catch_up, aftermath, controller.identity
+    )

@@ -75,6 +75,9 @@ Links = Annotated[
 Faults = Annotated[list[str] | None, typer.Option("--fault", metavar="FAULT", help="A fault to inject; repeatable.")]
 ClearFault = Annotated[bool, typer.Option("--clear-fault", help="Clear a fault that an earlier run left (live only).")]
 Operator = Annotated[OperatorKind | None, typer.Option(help="Default: auto in simulation, console on a terminal.")]
+GoOn = Annotated[
+    Path | None, typer.Option("--continue", metavar="RUN", help="Go on with a run that was stopped, as it was begun.")
+]
 NoReport = Annotated[bool, typer.Option("--no-report", help="Leave the report out.")]
 AllowExpired = Annotated[
     bool, typer.Option("--allow-expired", help="Use calibrations that are overdue; the report says so.")

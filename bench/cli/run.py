@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from contextlib import suppress
 
 from bench import runlog
 from bench.cli import reporting
 from bench.cli.compose import Request, prepare
+from bench.cli.loading import load_procedure
 from bench.cli.summary import summary
+from bench.errors import ConfigError
 from bench.progress import shown_on
 from bench.progress_text import columns
 from bench.record.outcomes import Outcome
-from bench.run import runner
+from bench.run import runner, stopped
 from bench.run.runner import RunResult
 from bench.run.supervisor import Supervisor
+from bench.rundir import RunDirectory
 
 STATUS = {Outcome.PASS: 0, Outcome.DONE: 0, Outcome.FAIL: 1, Outcome.ERROR: 3, Outcome.ABORTED: 4,
           Outcome.INDETERMINATE: 5}  # fmt: skip
@@ -33,12 +37,23 @@ def execute(request: Request, supervisor: Supervisor | None = None) -> RunResult
             return runner.run(job, request.out, connect, watching, progress, report)
 
 
+def _going_on(result: RunResult) -> str:
+    """How a run that was stopped is continued, where it can be: a line of the summary."""
+    if result.outcome not in (Outcome.ABORTED, Outcome.ERROR):
+        return ""
+    with suppress(ConfigError):
+        if stopped.can_continue(load_procedure(result.record.procedure), RunDirectory(result.directory)):
+            return f"  go on    {shlex.join(['bench', 'run', '--continue', str(result.directory)])}\n"
+    return ""
+
+
 def run_command(request: Request, whole: bool = False) -> int:
     """Run, say the outcome on standard error and the run directory on standard output; the outcome's exit status. `whole` is
     for every result and finding."""
     result = execute(request)
     with suppress(OSError):  # nobody reads any more, or the terminal is closed; the outcome stands all the same
         sys.stderr.write(summary(result.record, result.directory, whole=whole, width=columns()))
+        sys.stderr.write(_going_on(result))
         sys.stdout.write(f"{result.directory}\n")
         sys.stdout.flush()
     return STATUS[result.outcome]

@@ -12,12 +12,14 @@ from typing import Any
 
 from bench.calibration import Calibration, Need, settings_differ
 from bench.cli import opening
+from bench.cli.continuing import switched_on_ns
 from bench.cli.loading import load_procedure
 from bench.errors import ConfigError
 from bench.findings import Finding
 from bench.procedure import Measured, Procedure
-from bench.progress import Silent
+from bench.progress import Progress, Silent
 from bench.recording import Recording
+from bench.recording.earlier import Earlier
 from bench.rigfile import load_rig
 from bench.run.adoption import calibration_of
 from bench.run.evaluation import yielded
@@ -110,8 +112,11 @@ def flown(
     knobs: Knobs = QUICK,
     *,
     visit: int = 0,
+    progress: Progress | None = None,
+    earlier: Earlier | None = None,
 ) -> Flown:
-    """Draw a rig and take it through the machine's part of a run; what ended that early is in it.
+    """Draw a rig and take it through the machine's part of a run, or on with what is left of an `earlier` one; what ended that
+    early is in it.
 
     Raises:
         ConfigError: a calibration that is needed is not given, was made at other settings, or rules the plan out.
@@ -120,11 +125,13 @@ def flown(
     settings = chosen.plan.model_validate({**file.plans.get(procedure, {}), **plan})
     used = given(chosen.needs(settings), calibrations or {})
     chosen.refuse_by(file, settings, used)
-    drawn = draw(file, seed, truth, chosen.settings(file, settings), visit=visit)
-    job = Job(chosen.on(file), file, settings, {}, "sim", seed, calibrations=tuple(used), visit=visit)
+    stretch, start_ns = (0, None) if earlier is None else (earlier.stretch, switched_on_ns(earlier))
+    drawn = draw(file, seed, truth, chosen.settings(file, settings), visit=visit, stretch=stretch)
+    job = Job(chosen.on(file), file, settings, {}, "sim", seed, calibrations=tuple(used), visit=visit, earlier=earlier)
     supervisor = Supervisor()
-    with opening.of_truth(file, drawn, "auto", substeps=knobs.substeps, slice_s=knobs.slice_s)(supervisor) as live:
-        machine = acquired(job, path, live, supervisor, Silent(), plain=knobs.plain)
+    connect = opening.of_truth(file, drawn, "auto", substeps=knobs.substeps, slice_s=knobs.slice_s, start_ns=start_ns)
+    with connect(supervisor) as live:
+        machine = acquired(job, path, live, supervisor, progress or Silent(), plain=knobs.plain)
     return Flown(job, drawn, machine, path)
 
 

@@ -115,6 +115,9 @@ class Procedure:
     `measures` are kinds of quantities, each at the places where it is measured; `on` a rig that has names of its own for them
     they go by these, and `kinds` are what they were.
 
+    `continues` is the kind of its steps at which a run that was stopped can go on; "" where what the machine does between them
+    matters, so that it cannot (`bench.run.stopped`).
+
     `places` are words that stand in the `where` of what it measures, beside names of the rig and of the plan.
     """
 
@@ -143,6 +146,7 @@ class Procedure:
     left_out: Callable[[Any], tuple[Quantity, ...]] = field(default=_all_told)
     reached: tuple[str, ...] = ()
     assumes: tuple[str, ...] = ()
+    continues: str = ""
     places: tuple[str, ...] = ()
     kinds: tuple[Quantity, ...] = ()
     method: str = ""  # the report's section: plain paragraphs, parted by empty lines

@@ -26,7 +26,7 @@ from bench.uncertainty import PROBABILITY, Estimate, Interval, budget, correlati
 from bench.wholefile import write_whole
 
 SCHEMA: Literal[3] = 3
-"""2: outcome DONE, findings with `concerns`. 3: `setup`. Older records are read as they stand."""
+"""2: outcome DONE, findings with `concerns`. 3: `setup`, `continues`. Older records are read as they stand."""
 SCHEMA_FILE = Path(__file__).with_name("record.schema.json")
 
 
@@ -121,6 +121,20 @@ class RecordingFile:
 
 
 @dataclass(frozen=True)
+class ContinuedRun:
+    """A stopped run whose completed steps this one's recording took over: its name, recording and digest of that, how many
+    steps, when it was started (ISO 8601, UTC), and by what it was `stopped`, a code of a finding or `killed`."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = STRICT
+    run_id: str
+    file: str
+    sha256: str
+    steps: int
+    started: str
+    stopped: str
+
+
+@dataclass(frozen=True)
 class Correlations:
     """Correlation coefficients of the measured quantities, in the order of `names`."""
 
@@ -132,7 +146,8 @@ class Correlations:
 @dataclass(frozen=True)
 class Record:
     """`record.json`. Times are ISO 8601 UTC; `seed` and `visit` are None for a real rig; `plan` is in SI. Older records of
-    virtual rigs do not say the visit, which was 0, and those before schema 3 no `setup`."""
+    virtual rigs do not say the visit, which was 0, and those before schema 3 no `setup`. `continues` are the stopped runs that
+    it goes on with, oldest first."""
 
     __pydantic_config__: ClassVar[ConfigDict] = STRICT
     schema: Literal[1, 2, 3]
@@ -150,6 +165,7 @@ class Record:
     calibrations: tuple[Used, ...]
     versions: Mapping[str, str]
     recording: RecordingFile | None
+    continues: tuple[ContinuedRun, ...] = field(default=(), kw_only=True)
     link: LinkCounts
     findings: tuple[FindingEntry, ...]
     measurements: tuple[Measurement, ...]

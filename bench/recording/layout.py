@@ -156,6 +156,12 @@ def encode_block(
     return b"".join(parts)
 
 
+def block_counts(data: bytes) -> tuple[int, int]:
+    """Samples of a block message of ours, and how many are lost before them."""
+    _, _, _, count, _, lost, *_ = _HEAD_BYTES.unpack_from(data)
+    return count, lost
+
+
 class ViewWindows:
     """Reduces samples to one scalar message per window of `width_ns`: mean, minimum and maximum, or the last code.
 

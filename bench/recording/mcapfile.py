@@ -67,6 +67,15 @@ class McapFile:
                 if name == topic and start_ns <= t_ns < end_ns:
                     yield t_ns, data
 
+    def everything(self, end_ns: int = 1 << 63) -> Iterator[tuple[str, int, bytes]]:
+        """Topic, log time and data of every message of the chunks that begin by then, in file order; nothing is kept.
+
+        Raises:
+            RecordingError: a chunk is damaged, or holds what cannot be right.
+        """
+        for number in np.flatnonzero(self._spans[0] <= end_ns).tolist():
+            yield from self._read(number)
+
     @cached_property
     def _spans(self) -> tuple[npt.NDArray[np.uint64], npt.NDArray[np.uint64]]:
         """First and last time of every chunk, ns."""

@@ -101,6 +101,16 @@ class McapWriter:
         self._message(layout.EVENTS, t_ns, data)
         self._flush_if_due(t_ns)
 
+    def taken(self, messages: Sequence[tuple[str, int, bytes]]) -> None:
+        """Messages of another recording with the same streams, as they stand there; views only where there are such here."""
+        for topic, t_ns, data in messages:
+            if topic not in self._channels and topic.startswith(layout.raw_topic("")):
+                self._register(topic, "levbench.Frames", layout.raw_schema())
+            if topic in self._channels:
+                self._message(topic, t_ns, data)
+            if topic.endswith("/block"):
+                self.blocks[topic.removeprefix("/").removesuffix("/block")] += 1
+
     def _write_blocks(self, stream: str) -> None:
         blocks, self._pending[stream] = self._pending[stream], []
         if not blocks:

@@ -13,18 +13,20 @@ import queue
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from bench import lock
 from bench.calibration import Calibration
 from bench.calibration.file import attached
 from bench.clock import Clock
 from bench.errors import RecordingError
 from bench.link.frames import FRAME, FrameBatch
+from bench.recording.integrity import Integrity
 from bench.recording.mcapwriter import McapWriter
 from bench.rigfile import RigFile
 from bench.rigfile.aliases import with_full_names
@@ -41,21 +43,6 @@ class RunHeader:
 
     metadata: Mapping[str, Mapping[str, str]]
     attachments: Mapping[str, bytes]
-
-
-@dataclass
-class Integrity:
-    """Counts at close: frames by link; samples, losses and blocks by stream. Only what was written is counted; `complete`
-    is false when a live queue overflowed, `overflows` times."""
-
-    frames: dict[str, int] = field(default_factory=dict)
-    samples: dict[str, int] = field(default_factory=dict)
-    lost: dict[str, int] = field(default_factory=dict)
-    blocks: dict[str, int] = field(default_factory=dict)
-    events: int = 0
-    steps: int = 0
-    overflows: int = 0
-    complete: bool = True
 
 
 class Recorder:
@@ -85,6 +72,7 @@ class Recorder:
         self.path, self._clock, self._live, self._plain = path, clock, live, plain
         self.integrity = Integrity()
         self._newest: tuple[int, frozenset[str]] = (-1, frozenset())  # step: its number and its labels
+        self._completed: tuple[tuple[str, Mapping[str, Any]], ...] = ()  # steps that were taken over
         self._watched: dict[str, list[npt.NDArray[np.float64]]] = {}  # by channel: what came of it
         self._header = header
         self.wall: dict[str, str] = {}
@@ -94,6 +82,7 @@ class Recorder:
         self._high_water = 0
         try:
             self._file = path.open("xb")
+            lock.hold(self._file.fileno())
         except OSError as error:
             raise RecordingError(f"recording {path}: cannot be written: {error.strerror or error}") from error
         try:
@@ -126,7 +115,26 @@ class Recorder:
         if len(batch):
             kept = batch if self._plain else batch.astype(FRAME, copy=True)  # written at once, or by the thread
             self._put("frames", link, lag_ns, kept)
-            _add(self.integrity.frames, link, len(batch))
+            self.integrity.add("frames", link, len(batch))
+
+    def take(self, messages: Sequence[tuple[str, int, bytes]]) -> None:
+        """Take messages of another recording over: topic, time and bytes (`bench.recording.takeover`)."""
+        self._put("taken", messages)
+        for topic, _, data in messages:
+            self.integrity.count(topic, data)
+
+    def go_on(self, begun: int, completed: tuple[tuple[str, Mapping[str, Any]], ...]) -> None:
+        """What is recorded next comes after `begun` steps that were taken over, of which these were `completed`."""
+        self.integrity.steps, self._completed = begun, completed
+
+    def completed(self, kind: str) -> tuple[Mapping[str, Any], ...]:
+        """Labels of the steps of a kind that a stopped run had completed and this one, which continues it, need not record."""
+        return tuple(labels for name, labels in self._completed if name == kind)
+
+    @property
+    def waiting(self) -> int:
+        """How much the writer has yet to do."""
+        return self._queue.qsize()
 
     def stream(self, layout: StreamLayout) -> None:
         """Add a stream, such as a capture, while recording.
@@ -150,8 +158,8 @@ class Recorder:
             self._put("samples", block)
             for name in self._watched if self._watched.keys() <= {TICKS, *block.columns} else ():
                 self._watched[name].append(np.array(block.ticks if name == TICKS else block.columns[name], np.float64))
-            _add(self.integrity.samples, block.stream, len(block))
-            _add(self.integrity.lost, block.stream, block.lost_before)
+            self.integrity.add("samples", block.stream, len(block))
+            self.integrity.add("lost", block.stream, block.lost_before)
 
     def event(self, kind: str, t_ns: int | None = None, **data: Any) -> int:
         """Record something that happened, at `t_ns` or now; `data` are JSON values. The time, ns."""
@@ -286,7 +294,3 @@ def _why(failure: BaseException) -> str:
     full = isinstance(failure, OSError) and failure.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
     why = getattr(failure, "strerror", None) or repr(failure)
     return f"{why}. Next: free space there, or give another --out" if full else why
-
-
-def _add(counts: dict[str, int], name: str, count: int) -> None:
-    counts[name] = counts.get(name, 0) + count

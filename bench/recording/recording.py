@@ -242,6 +242,14 @@ class Recording(Attachments[P]):
                 _, records = layout.decode_frames(data)
                 yield frames_of(records, self.version)
 
+    def everything(self, end_ns: int = 1 << 63) -> Iterator[tuple[str, int, bytes]]:
+        """Topic, time and bytes of every message as it stands in the file; chunks that begin later are left out."""
+        return self._file.everything(end_ns)
+
+    def stored_events(self) -> Iterator[tuple[int, bytes]]:
+        """Time and bytes of each of the `events`."""
+        return self._file.messages(layout.EVENTS)
+
     def close(self) -> None:
         """Nothing stays open between reads; here for symmetry with the recorder."""
 

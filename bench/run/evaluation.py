@@ -20,6 +20,7 @@ from bench.record.limited import limit_of, never_measured
 from bench.record.limits import Limit
 from bench.record.outcomes import SOUND, Outcome, outcome_of, unjudged
 from bench.record.records import (
+    ContinuedRun,
     Correlations,
     Measurement,
     Record,
@@ -34,12 +35,14 @@ from bench.record.specs import applied, in_unit
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile.aliases import by_names
+from bench.run import continued
 from bench.run.certificates import overdue
 from bench.run.step_gaps import incomplete_steps, missing_steps
 
 logger = logging.getLogger("bench.run.evaluation")
 ANALYSIS_FAILED = "analysis-failed"
 RUN_END = "run-end"
+TRUNCATED = "recording-truncated"
 
 
 @dataclass(frozen=True)
@@ -69,7 +72,7 @@ class Ending:
         events = recording.events(RUN_END)
         if recording.truncated or not events:
             text = "the recording was cut off: its process was killed or lost power; what was written before is whole"
-            return cls(Outcome.ERROR, (Finding("recording-truncated", text, recording.path.name, Effect.ERROR),))
+            return cls(Outcome.ERROR, (Finding(TRUNCATED, text, recording.path.name, Effect.ERROR),))
         try:
             e = events[-1]
             found = tuple(Finding(f["code"], f["text"], f["where"], Effect(f["effect"]), tuple(f.get("concerns", ())))
@@ -87,6 +90,7 @@ class Evaluation:
     correlations: Correlations
     findings: tuple[Finding, ...]
     certified: Mapping[str, Certified] = field(default_factory=dict)
+    continues: tuple[ContinuedRun, ...] = ()
 
     def finish(self, record: Record, ending: Ending, ended: str, recording: RecordingFile | None) -> Record:
         """An unfinished record with its end; the outcome follows from what it holds."""
@@ -96,7 +100,7 @@ class Evaluation:
         findings = (*ending.findings, *(f for f in self.findings if (f.code, f.where) not in known))
         return replace(
             record, ended=ended, recording=recording, link=ending.link, findings=findings_of(findings),
-            measurements=self.measurements, correlations=self.correlations,
+            measurements=self.measurements, correlations=self.correlations, continues=self.continues,
             setup=None if record.setup is None else replace(record.setup, certified=self.certified),
             outcome=outcome_of(self.measurements, findings, ending.stopped),
         )  # fmt: skip
@@ -118,7 +122,8 @@ def evaluate(
         procedure = procedure.on(recording.rig, recording.plan)
         limits = by_names(recording.rig.aliases, limits)
     if stopped or recording is None:
-        return Evaluation(_in_order(procedure, {}, limits), Correlations((), ()), ())
+        before = () if recording is None else continued.continued_runs(recording)
+        return Evaluation(_in_order(procedure, {}, limits), Correlations((), ()), (), before)
     left_out = [q.name for q in quantities_on(recording.rig.aliases, procedure.left_out(recording.plan))]
     stated, (limits, notes) = limits, applied(limits, recording.plan, left_out)
     limits, mistaken = in_unit(limits, (*procedure.measures, *procedure.kinds))
@@ -145,14 +150,19 @@ def evaluate(
     if recording.verdict_required and (nothing := unjudged(measurements, len(stated))) is not None:
         findings.append(nothing)
     certified = certified_of(recording.rig, (e.influence for m in measurements for e in m.budget))
-    return Evaluation(measurements, correlations, tuple(findings), certified)
+    return Evaluation(measurements, correlations, tuple(findings), certified, continued.continued_runs(recording))
 
 
 def yielded(procedure: Procedure, recording: Recording[Any]) -> Iterator[Measured | Finding]:
     """What a closed recording says: of the calibrations that the run used, of steps that lack samples, what `analyse` yields,
     and of steps that are missing."""
     explained = False
-    for item in chain(_calibrations(recording), incomplete_steps(recording), procedure.analyse(recording)):
+    for item in chain(
+        _calibrations(recording),
+        continued.findings(recording),
+        incomplete_steps(recording),
+        procedure.analyse(recording),
+    ):
         explained = explained or (isinstance(item, Finding) and item.effect is not Effect.NOTE)
         yield item
     if not explained:  # else a procedure that ended early has said why

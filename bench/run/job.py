@@ -13,6 +13,7 @@ from bench.findings import Finding
 from bench.procedure import BenchPlan, Procedure
 from bench.procedure.rig import Rig
 from bench.record.limits import Limit
+from bench.recording.earlier import Earlier
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.run.supervisor import SafeStep, Supervisor
@@ -23,7 +24,8 @@ from bench.samples import StreamLayout
 class Job:
     """What is to be run. `seed` is None on a real rig, where `visit` means nothing; `lock` is what others must not share,
     None in simulation; `calibrations` are those that the procedure needs, looked up and found fit. With `require_verdict` a
-    run that judged nothing is an error."""
+    run that judged nothing is an error. `earlier` is what a stopped run left that this one continues; `asked` how it can be
+    asked for again, None where nobody will (`bench.run.continued`)."""
 
     procedure: Procedure
     rig: RigFile
@@ -35,6 +37,8 @@ class Job:
     calibrations: tuple[Calibration, ...] = ()
     require_verdict: bool = False
     visit: int = 0
+    earlier: Earlier | None = None
+    asked: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True)
@@ -45,7 +49,7 @@ class OpenRig:
     checks so that make-safe can talk to a machine that has tripped, `safe_steps` are the ordered make-safe. `truth` is
     what a simulated rig drew, for `truth.json`; `findings` are what was noticed while opening it. `catch_up` lets the
     clock run until telemetry has reached the present: at the end of each step, before anything else is commanded.
-    `aftermath` tells what the machine did while it was made safe.
+    `aftermath` tells what the machine did while it was made safe; `identity` is what the controller says that it is.
     """
 
     rig: Rig
@@ -57,6 +61,7 @@ class OpenRig:
     findings: Sequence[Finding] = ()
     catch_up: Callable[[], None] = lambda: None
     aftermath: Callable[[], tuple[Finding, ...]] = tuple
+    identity: Mapping[str, float] = field(default_factory=dict)
 
 
 class WatchedClock:

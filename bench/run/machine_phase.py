@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from bench import runlog
+from bench.clock import Clock
 from bench.display_units import of_labels
 from bench.errors import (
     Aborted,
@@ -42,9 +43,12 @@ from bench.procedure.roles import RigState
 from bench.procedure.states import transition
 from bench.progress import Progress
 from bench.record.outcomes import Outcome
+from bench.recording.earlier import Earlier
 from bench.recording.recorder import Recorder
+from bench.recording.takeover import taking_over
 from bench.rigfile.registers import RegisterRefused
 from bench.run import provenance
+from bench.run.continued import IDENTITY
 from bench.run.evaluation import Ending
 from bench.run.job import Job, OpenRig
 from bench.run.supervisor import SafeStep, Supervisor
@@ -63,6 +67,7 @@ CODES: tuple[tuple[type[BaseException], str], ...] = (
     (BenchError, "run-failed"),
 )  # fmt: skip
 """The finding of an error that ends a run: the first kind that it is."""
+SLICE_S, MOST_WAITING = 0.02, 4  # while an earlier recording is taken over
 
 
 @dataclass(frozen=True)
@@ -96,7 +101,6 @@ def acquired(
             live=job.backend == "live", plain=plain,
         )  # fmt: skip
         with recorder:
-            live.attach(recorder)
             cause, findings, up = _moved(job, live, recorder, supervisor, progress)
             ending = _ending(cause, findings, live, recorder)
             said = wall()
@@ -125,13 +129,18 @@ def _moved(
     with runlog.warnings_to(lambda room, text: recorder.event("log", room=room, text=text)):
         try:
             with supervisor.moving():
+                if job.earlier is not None:
+                    _take_over(job, job.earlier, recorder, rig.clock, progress)
+                live.attach(recorder)
+                if live.identity:
+                    recorder.event(IDENTITY, said=dict(live.identity))
                 progress.stage(f"bring the rig to {procedure.state}")
                 transition(rig, RigState.READY)
                 rig.levitation.write(procedure.settings(job.rig, job.plan))
                 transition(rig, procedure.state)
                 up = True
                 progress.stage("acquire")
-                progress.total(procedure.steps(job.rig, job.plan))
+                progress.total(_steps_to_do(job))
                 procedure.acquire(rig, job.plan, cast(Recorder, WatchedSteps(recorder, progress, live.catch_up)))
         except BaseException as error:
             # Whatever it is, also SystemExit: the machine is made safe first.
@@ -144,6 +153,21 @@ def _moved(
             known = None if cause is None else cause_of(cause)[1].code
             findings += tuple(f for f in live.aftermath() if f.code != known)
     return cause, findings, up
+
+
+def _steps_to_do(job: Job) -> int:
+    """For the progress display; what a stopped run completed is done, and the last of it is repeated."""
+    planned = job.procedure.steps(job.rig, job.plan)
+    return planned if job.earlier is None or not planned else planned - len(job.earlier.steps) + 1
+
+
+def _take_over(job: Job, earlier: Earlier, recorder: Recorder, clock: Clock, progress: Progress) -> None:
+    """What a stopped run recorded, while the rig's clock runs: heartbeats go on, and nothing of this run is recorded yet."""
+    progress.stage(f"take over {len(earlier.steps)} completed steps")
+    for _ in taking_over(recorder, earlier):
+        clock.sleep(SLICE_S)
+        while job.backend == "live" and recorder.waiting > MOST_WAITING:  # else the writer is waited for by itself
+            clock.sleep(SLICE_S)
 
 
 def _told(cause: BaseException | None, progress: Progress) -> None:

@@ -52,7 +52,7 @@ def reanalysed(run: RunDirectory, procedure: Procedure, recording: Recording[Any
         RecordingError: the recording's end, limits or rig file cannot be read.
     """
     ending = Ending.read(recording)
-    evaluation = evaluate(procedure, recording, _limits(recording), stopped=ending.stopped is not None)
+    evaluation = evaluate(procedure, recording, stored_limits(recording), stopped=ending.stopped is not None)
     wall = recording.wall
     record = unfinished(
         run_id=wall.get("run_id") or run.run_id, procedure=procedure.name, rig=recording.rig.name,
@@ -73,7 +73,7 @@ def _setup(procedure: Procedure, recording: Recording[Any]) -> Setup | None:
         return None
 
 
-def _limits(recording: Recording[Any]) -> dict[str, Limit]:
+def stored_limits(recording: Recording[Any]) -> dict[str, Limit]:
     """The acceptance limits that the run was made with.
 
     Raises:

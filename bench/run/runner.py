@@ -27,7 +27,7 @@ from bench.record.records import Record, RecordingFile, findings_of, unfinished,
 from bench.record.setup import setup_of
 from bench.recording import Recording
 from bench.recording.reserve import reserved
-from bench.run import index, provenance
+from bench.run import index, provenance, stopped
 from bench.run.evaluation import Ending, Evaluation, evaluate
 from bench.run.job import Connect, Job, OpenRig
 from bench.run.machine_phase import Acquired, acquired, cause_of
@@ -79,10 +79,15 @@ def run(
         stack.enter_context(supervisor.finishing())  # from here on a signal ends in the record, not in a traceback
         with connect(supervisor) as live:  # what is wrong with a link is said before anything exists
             _same_kind(job, live)
+            if job.earlier is not None:
+                stopped.require_same_controller(job.earlier, live.identity)
+                stopped.require_later(job.earlier, live.rig.clock.now_ns())
             directory = rundir.create(out, job.procedure.name, started)
             release = stack.enter_context(reserved(directory.path))
             record = _unfinished(job, directory, started)
             write_record(directory.record, record)
+            if job.asked is not None:
+                _write_json(directory.asked, job.asked)
             stack.enter_context(runlog.to_file(directory.log))
             which = "" if job.seed is None else f", seed {job.seed}, visit {job.visit}"
             logger.info("run %s on rig %s, backend %s%s", directory.run_id, job.rig.name, job.backend, which)

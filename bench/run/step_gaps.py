@@ -9,6 +9,7 @@ from bench.display_units import of_labels
 from bench.findings import Effect, Finding
 from bench.procedure import Procedure
 from bench.recording import Recording
+from bench.recording.earlier import AGAIN
 
 NAMED = 12  # more are counted together
 
@@ -35,6 +36,7 @@ def missing_steps(procedure: Procedure, recording: Recording[Any]) -> Iterator[F
     planned = (former or procedure.fewest_steps or procedure.step_count)(recording.plan)
     if procedure.steps_on is not None:
         planned = min(planned, procedure.steps_on(recording.rig, recording.plan))
-    if (there := len(recording.all_steps())) < planned:
+    there = sum(not step.kind.endswith(AGAIN) for step in recording.all_steps())
+    if there < planned:
         text = f"the plan asks for {planned} steps or more; the recording has {there}"
         yield Finding("steps-missing", text, "acquire", Effect.INDETERMINATE)

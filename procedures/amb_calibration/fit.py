@@ -93,18 +93,38 @@ def fit(h: Hangings, p: Mapping[str, float], bias_A: float, masses: int, *, top_
     first one's K.
     """
     ip, i_n = _true_currents(h.currents, p, h.pull.keys)
-    u = (ip**2 - i_n**2) / (4 * bias_A)
-    v = (ip**2 + i_n**2) / 2 - bias_A**2
-    branch = np.where(h.load == masses - 1, top_branch, h.branch)
-    design = np.stack([np.ones_like(u), u, v, np.broadcast_to(branch, u.shape)], axis=-1)
+    design = terms_of(h, p, bias_A, masses, top_branch=top_branch)
     solvers = np.linalg.pinv(design)
     applied = _applied_forces(h, p, masses)
     terms = np.einsum("bafp,bap->baf", solvers, applied)
-    stiffness = terms[:, :, 1].mean(axis=1) * bias_A / np.array([gap(plane, p) for plane in h.pull.planes])
-    forces = applied + _motor_forces(h, p) - stiffness[:, None, None] * h.positions
+    forces = _referred(h, p, bias_A, masses, terms)
     terms = np.einsum("bafp,bap->baf", solvers, forces)
     residuals = forces - np.einsum("bapf,baf->bap", design, terms)
     return Fit(terms, residuals, solvers, forces, (ip - i_n) / 2, h.pull)
+
+
+def left_over(h: Hangings, f: Fit, p: Mapping[str, float], bias_A: float, masses: int) -> Array:
+    """Residuals (K, A, P) in N that hangings leave by the terms of a fit, of these or of others at the same angles."""
+    design = terms_of(h, p, bias_A, masses)
+    out: Array = _referred(h, p, bias_A, masses, f.terms) - np.einsum("bapf,baf->bap", design, f.terms)
+    return out
+
+
+def terms_of(h: Hangings, p: Mapping[str, float], bias_A: float, masses: int, *, top_branch: float = 1.0) -> Array:
+    """What F_0, K, K2 and H are multiplied by, (K, A, P, 4)."""
+    ip, i_n = _true_currents(h.currents, p, h.pull.keys)
+    u = (ip**2 - i_n**2) / (4 * bias_A)
+    v = (ip**2 + i_n**2) / 2 - bias_A**2
+    branch = np.where(h.load == masses - 1, top_branch, h.branch)
+    out: Array = np.stack([np.ones_like(u), u, v, np.broadcast_to(branch, u.shape)], axis=-1)
+    return out
+
+
+def _referred(h: Hangings, p: Mapping[str, float], bias_A: float, masses: int, terms: Array) -> Array:
+    """Forces (K, A, P) in N referred to the sensors' zero, by the K of the `terms`."""
+    stiffness = terms[:, :, 1].mean(axis=1) * bias_A / np.array([gap(plane, p) for plane in h.pull.planes])
+    out: Array = _applied_forces(h, p, masses) + _motor_forces(h, p) - stiffness[:, None, None] * h.positions
+    return out
 
 
 def _true_currents(currents: Array, p: Mapping[str, float], keys: tuple[str, ...]) -> tuple[Array, Array]:

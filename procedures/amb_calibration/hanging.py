@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from bench.errors import RotorNotArrived
 from bench.procedure.rig import Rig
 from bench.procedure.roles import NOTHING, Load
 from bench.recording.recorder import Recorder
@@ -50,20 +52,55 @@ def exercised(rig: Rig, plan: Plan, record: Recorder, pull: Pull, hook: str) -> 
     return True
 
 
-def hung_up_and_down(rig: Rig, plan: Plan, record: Recorder, pull: Pull, hook: str) -> bool:
-    """False where a bearing pulls with one coil alone, which no hanging changes."""
-    for turn in range(plan.angles):
-        angle = turns.turn(rig, 2 * math.pi * turn / plan.angles, plan.angles)
+def hung_up_and_down(
+    rig: Rig, plan: Plan, record: Recorder, pull: Pull, hook: str, done: Sequence[Mapping[str, Any]]
+) -> bool:
+    """False where a bearing pulls with one coil alone, which no hanging changes. Of the steps `done` by a run that this one
+    continues the last one is repeated, and none of the others."""
+    again = len(done) - 1  # number of that step, of all on this hook; -1 where there is none
+    for turn in range(max(again, 0) // len(sequence(plan)), plan.angles):
+        angle = _turned(rig, plan, turn, done)
         for k, (load, branch) in enumerate(sequence(plan)):
+            number = turn * len(sequence(plan)) + k
+            if number < again:
+                continue
+            if number == again:
+                load = Load(str(done[again]["load"]))  # what really hung
+                _from_above(rig, plan, load, branch, hook)
             hanging = rig.operator.hang(replace(load, hook=hook))
             rig.clock.sleep(plan.settle_s)
-            if turn == k == 0 and (needed := both_coils.at_no_load(pull, rig.levitation.reading, plan.bias_A)):
+            if number == 0 and (needed := both_coils.at_no_load(pull, rig.levitation.reading, plan.bias_A)):
                 record.event(both_coils.ONE_SIDED, needed=needed)
                 return False
             labels = HangOn(angle, hanging.label, branch, hook) if hook else Hang(angle, hanging.label, branch)
-            with record_step(record, labels):
+            with record_step(record, labels, again=number == again):
                 rig.clock.sleep(plan.average_s)
     return True
+
+
+def _turned(rig: Rig, plan: Plan, turn: int, done: Sequence[Mapping[str, Any]]) -> float:
+    """The shaft at an angle; one at which hangings are done it must stand at again, as near as anybody reads it.
+
+    Raises:
+        RotorNotArrived: it stands elsewhere.
+    """
+    first = turn * len(sequence(plan))
+    wanted = float(done[first]["angle_rad"]) if first < len(done) else 2 * math.pi * turn / plan.angles
+    angle = turns.turn(rig, wanted, plan.angles)
+    if first < len(done) and angle != wanted:
+        raise RotorNotArrived(
+            f"the shaft stands at {math.degrees(angle):g}°; expected {math.degrees(wanted):g}°, where the hangings of the "
+            "stopped run were done. Next: continue once more, and turn it there"
+        )
+    return angle
+
+
+def _from_above(rig: Rig, plan: Plan, load: Load, branch: int, hook: str) -> None:
+    """A load that was reached by unloading is reached so again: magnets remember from which side. The exercise before ends at
+    nothing, so that all else is reached as it was."""
+    if branch < 0 and load.label:
+        rig.operator.hang(Load(plan.masses[-1], hook))
+        rig.clock.sleep(plan.settle_s)
 
 
 def _controls(rig: Rig, pull: Pull) -> dict[str, float]:

@@ -23,7 +23,7 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.roles import STATUS
 from bench.uncertainty import Estimate, propagate
-from procedures.amb_calibration import both_coils, checks, hypotheses, turns
+from procedures.amb_calibration import both_coils, checks, halves, hypotheses, turns
 from procedures.amb_calibration import by_angle as amb_calibration_by_angle
 from procedures.amb_calibration import figures as drawn
 from procedures.amb_calibration import fit as amb_calibration_fit
@@ -35,7 +35,7 @@ from procedures.amb_calibration.inputs import fit_inputs, hand_rad
 from procedures.amb_calibration.plan import Plan
 from procedures.amb_calibration.pulls import Loaded, Pull, pulls
 from procedures.amb_calibration.scatter import Scatter, covariance_by_angle, covariance_over_a_turn, outputs, scatter
-from procedures.amb_calibration.steps import HangingData, channels, hung, read_hangings
+from procedures.amb_calibration.steps import Hang, HangingData, channels, hung, read_hangings
 from procedures.servomotor.loads import check_masses
 from procedures.shared import assumptions
 from procedures.shared.weight import weight
@@ -58,11 +58,16 @@ def step_count(plan: Plan) -> int:
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
-    """Hang every mass up and down at each angle, on each hook; its hanger stays on throughout."""
-    found = pulls(rig.file)
-    for pull in found:
-        hook = pull.hook if len(found) > 1 else ""
-        if not exercised(rig, plan, record, pull, hook) or not hung_up_and_down(rig, plan, record, pull, hook):
+    """Hang every mass up and down at each angle, on each hook; its hanger stays on throughout. A run that goes on with a
+    stopped one exercises the magnets anew, for they were off, and begins with the last hanging that was done."""
+    found, done, each = pulls(rig.file), record.completed(Hang.kind), step_count(plan)
+    for number, pull in enumerate(found):
+        hook, of_hook = pull.hook if len(found) > 1 else "", done[number * each : (number + 1) * each]
+        if len(of_hook) == each and len(done) > (number + 1) * each:
+            continue  # the last hanging of all is on another hook
+        if not exercised(rig, plan, record, pull, hook):
+            return
+        if not hung_up_and_down(rig, plan, record, pull, hook, of_hook):
             return
 
 
@@ -100,6 +105,7 @@ def _evaluated(recording: Recording[Plan], findings: Findings, pull: Pull, sever
     if several:
         a = replace(a, identity=f"scatter/{pull.hook}")
     values = {name: e.value for name, e in a.inputs.items()}
+    findings.add(halves.findings(recording, data, a.fit, values))
     findings.gate(
         checks.of_fit(data, a.fit, a.scatter, a.loads, a.beyond, values, plan, masses_u(recording)), checks.FATAL
     )
@@ -233,6 +239,7 @@ procedure = Procedure(
     step_count=step_count,
     facts=facts,
     holds_for=lambda plan: {"bias_A": plan.bias_A, "angles": plan.angles},
+    continues=Hang.kind,
     reached=("masses/*", "!masses/hanger", "!masses/density"),
     assumes=assumptions.AMB_CALIBRATION,
     method=read_method(__file__),

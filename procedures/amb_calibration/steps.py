@@ -81,9 +81,9 @@ def read_hangings(recording: Recording[Plan], pull: Pull | None = None) -> Hangi
     taken = [s for s in recording.steps(Hang.kind) if not several or s.labels["hook"] == pull.hook]
     steps, shape = by_angle(Steps(tuple(taken)), "hangings")
     table: StepTable[Hang] = tabulate(steps, HangOn if several else Hang, channels(rig), shape=shape)
-    at_motor, at = _displacements(rig, pull, table)
+    currents, at, at_motor = _means(rig, pull, table)
     hangings = Hangings(
-        np.stack([table.stack(axis.coils) for axis in pull.axes]),
+        currents,
         at,
         at_motor,
         load_index([hang.load for hang in table.labels], masses, "hanger").reshape(shape),
@@ -92,6 +92,20 @@ def read_hangings(recording: Recording[Plan], pull: Pull | None = None) -> Hangi
         pull,
     )
     return HangingData(hangings, table, masses, hung(rig, pull.hook))
+
+
+def arrays(
+    recording: Recording[Plan], pull: Pull, steps: Steps, shape: tuple[int, int]
+) -> tuple[tuple[Array, Array, Array], StepTable[Hang]]:
+    """Currents, positions and motor displacements of some hangings, shaped (..., A, P), as `Hangings` has them; their table."""
+    kind = HangOn if len(pulls(recording.rig)) > 1 else Hang
+    table: StepTable[Hang] = tabulate(steps.items, kind, channels(recording.rig), shape=shape)
+    return _means(recording.rig, pull, table), table
+
+
+def _means(rig: RigFile, pull: Pull, table: StepTable[Hang]) -> tuple[Array, Array, Array]:
+    at_motor, at = _displacements(rig, pull, table)
+    return np.stack([table.stack(axis.coils) for axis in pull.axes]), at, at_motor
 
 
 def hung(rig: RigFile, hook: str) -> tuple[float, float]:

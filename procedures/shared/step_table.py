@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.errors import AnalysisError
+from bench.recording.earlier import AGAIN
 from bench.recording.recorder import Recorder
 from bench.recording.steps import Step, Steps
 from bench.rigfile.roles import STATUS
@@ -33,9 +34,9 @@ Kind = TypeVar("Kind", bound=Labels, covariant=True)
 Read = TypeVar("Read", bound=Labels)
 
 
-def record_step(record: Recorder, labels: Labels) -> AbstractContextManager[None]:
-    """A step with these labels."""
-    return record.step(labels.kind, **asdict(labels))
+def record_step(record: Recorder, labels: Labels, *, again: bool = False) -> AbstractContextManager[None]:
+    """A step with these labels; `again`: it repeats one of a stopped run that goes on, and is of a kind of its own."""
+    return record.step(f"{labels.kind}{AGAIN}" if again else labels.kind, **asdict(labels))
 
 
 @dataclass(frozen=True)

@@ -132,7 +132,7 @@ def kept(batch: FrameBatch, sequence: Iterable[int], truth: Truth) -> FrameBatch
     dropped = truth.defects["drop_fraction"]
     if not dropped:
         return batch
-    keep = [uniform(truth.seed, f"drop:{number}", truth.visit) >= dropped for number in sequence]
+    keep = [uniform(truth.seed, truth.anew(f"drop:{number}"), truth.visit) >= dropped for number in sequence]
     left: FrameBatch = batch[np.array(keep, dtype=bool)]
     return left
 

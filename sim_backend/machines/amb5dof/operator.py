@@ -47,7 +47,7 @@ class Balancer:
         self._fixed += 1
         seed, visit, defects = self._truth.seed, self._truth.visit, self._truth.defects
         off = [
-            draw_one(t, seed, f"weight:{k}:{self._fixed}", visit) if t is not None else 0.0
+            draw_one(t, seed, self._truth.anew(f"weight:{k}:{self._fixed}"), visit) if t is not None else 0.0
             for k, t in enumerate(self._errors)
         ]
         if self._fixed == defects["weight_astray"]:

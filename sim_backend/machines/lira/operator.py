@@ -52,7 +52,9 @@ class Attendant:
         elsewhere = defects["places_exchanged"] or defects["misplaced"] == self.hung
         at = others[0] if elsewhere and others else self._at[hook]
         kg = values[f"masses.{label}"] * (1 + defects.get(f"mass_error_{label}", 0.0))
-        seat = self._seat_m * (2 * uniform(self._truth.seed, f"seat:{self.hung}", self._truth.visit) - 1)
+        seat = self._seat_m * (
+            2 * uniform(self._truth.seed, self._truth.anew(f"seat:{self.hung}"), self._truth.visit) - 1
+        )
         self._plant.hang(kg, weight_in_air(kg, values), at + seat)
 
 

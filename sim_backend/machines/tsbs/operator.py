@@ -40,5 +40,7 @@ class SimulatedOperator:
     def _hang(self, label: str) -> None:
         kg, newtons = self._truth.load(label)
         self._hangings += 1
-        seat = self._seat_m * (2 * uniform(self._truth.seed, f"seat:{self._hangings}", self._truth.visit) - 1)
+        seat = self._seat_m * (
+            2 * uniform(self._truth.seed, self._truth.anew(f"seat:{self._hangings}"), self._truth.visit) - 1
+        )
         self._plant.load(kg, newtons, HAND_OVER_S, seat_m=seat)

@@ -69,7 +69,9 @@ class Fitter:
         return label == "-" or f"masses.{label}" in self._truth.values
 
     def _drawn(self, name: str, what: str, count: int) -> float:
-        return draw_one(drawn(self._rig)[name], self._truth.seed, f"{what}:{count}", self._truth.visit)
+        return draw_one(
+            drawn(self._rig)[name], self._truth.seed, self._truth.anew(f"{what}:{count}"), self._truth.visit
+        )
 
     def _hang(self, name: str, label: str) -> None:
         """Down, or by a pulley: what friction leaves of the weight, and not quite in the direction that the file says."""
@@ -132,7 +134,9 @@ class Fitter:
             draw = (
                 0.0
                 if found is None
-                else draw_one(found.number, self._truth.seed, f"weight:{k}:{self._fixed}", self._truth.visit)
+                else draw_one(
+                    found.number, self._truth.seed, self._truth.anew(f"weight:{k}:{self._fixed}"), self._truth.visit
+                )
             )
             out.append(draw)
         return out[0], out[1]

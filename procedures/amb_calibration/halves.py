@@ -1,0 +1,136 @@
+"""Drift between the halves of a calibration that was stopped and continued, by the hanging that is done in both.
+
+The same mass at the same angle asks for the same force. What the fit's terms make of the currents of both hangings, less what
+positions add, differs by d = r' - r; a hanging scatters (its strap seats anew, noise) by the covariance that the fit's
+residuals have, freed of a step between the halves, so that d has twice that variance. |d| beyond Student's t at CHANCE is a
+drift, told with its 95 % interval: of current or position sensors, of the magnets, or a hanger that hangs otherwise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.findings import Effect, Finding
+from bench.recording import Recording
+from bench.recording.earlier import AGAIN, CONTINUED
+from bench.recording.steps import Step, Steps
+from bench.uncertainty.coverage import coverage_factor
+from procedures.amb_calibration.fit import Fit, Hangings, left_over, terms_of
+from procedures.amb_calibration.plan import Plan
+from procedures.amb_calibration.pulls import Pull, pulls
+from procedures.amb_calibration.scatter import Scatter, scatter
+from procedures.amb_calibration.steps import Hang, HangingData, arrays
+
+Array = npt.NDArray[np.float64]
+DRIFTED, UNCHECKED = "drift-between-halves", "halves-unchecked"
+CHANCE = 1e-3  # that a sound run tells a drift, of all its axes together
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A hanging that was done in both halves: its angle and its place among those there; `forces` (K,) N, second less first,
+    of each axis, their standard deviations `u` and degrees of freedom."""
+
+    angle: int
+    place: int
+    forces: Array
+    u: Array
+    dof: float
+
+
+def findings(recording: Recording[Plan], data: HangingData, f: Fit, p: Mapping[str, float]) -> Iterator[Finding]:
+    """A finding for each axis that drifted between two halves, and for halves that nothing holds together."""
+    pull = data.hangings.pull
+    repeats = _of_pull(recording, pull, f"{Hang.kind}{AGAIN}")
+    hangings = _of_pull(recording, pull, Hang.kind)
+    for seam in (e["t_ns"] for e in recording.events(CONTINUED)):
+        before = [s for s in hangings if s.end_ns <= seam]
+        after = next((s for s in repeats if s.start_ns >= seam), None)
+        if not before or (after is None and _elsewhere(recording, seam)):
+            continue  # another hook's
+        if after is None or dict(after.labels) != dict(before[-1].labels):
+            text = ("the hanging that a stopped run did last was not done again when it went on: whether anything drifted "
+                    "meanwhile is not known.")  # fmt: skip
+            yield Finding(UNCHECKED, text, "", Effect.INDETERMINATE)
+            continue
+        found = difference(recording, data, f, p, before[-1], after)
+        yield from _drifts(found, data, f)
+
+
+def difference(
+    recording: Recording[Plan], data: HangingData, f: Fit, p: Mapping[str, float], first: Step, second: Step
+) -> Difference:
+    """What a hanging asks for when it is done again, less what it asked for."""
+    plan, h = recording.plan, data.hangings
+    flat = int(np.flatnonzero(data.table.start_ns.ravel() == first.start_ns)[0])
+    at = divmod(flat, h.load.shape[1])
+    again = arrays(recording, h.pull, Steps((second,)), (1, 1))[0]
+    count = len(plan.masses)
+    changed = _with(h, at, again)
+    moved = left_over(changed, f, p, plan.bias_A, count) - left_over(h, f, p, plan.bias_A, count)
+    one, axes = _scatter(recording, data, f, p), range(len(f.terms))
+    u = np.sqrt([2 * one.covariance[(b, b, *at)] for b in axes])
+    return Difference(at[0], at[1], moved[(slice(None), *at)], u, float(one.dof))
+
+
+def _drifts(found: Difference, data: HangingData, f: Fit) -> Iterator[Finding]:
+    from scipy.special import stdtrit
+
+    limit = float(stdtrit(found.dof, 1 - CHANCE / len(found.forces) / 2))
+    k, what = (
+        coverage_factor(found.dof),
+        str(data.table.labels[found.angle * data.hangings.load.shape[1] + found.place]),
+    )
+    for b, axis in enumerate(f.pull.axes):
+        d, u = float(found.forces[b]), float(found.u[b])
+        if abs(d) <= limit * u:
+            continue
+        share = abs(d) / float(np.ptp(f.forces[b]))
+        text = (
+            f"the last hanging before the run was stopped ({what}), done again when it went on, asks the {axis.title} for "
+            f"{d:+.3f} N ± {k * u:.3f} N more ({share:.2%} of the load range): something drifted between the halves, a current "
+            "or position sensor, the magnets, or how the hanger hangs. Next: run it anew, all in one"
+        )
+        yield Finding(DRIFTED, text, axis.where, Effect.INDETERMINATE)
+
+
+def _of_pull(recording: Recording[Plan], pull: Pull, kind: str) -> list[Step]:
+    several = len(pulls(recording.rig)) > 1
+    return [s for s in recording.steps(kind) if not several or s.labels["hook"] == pull.hook]
+
+
+def _elsewhere(recording: Recording[Plan], seam: int) -> bool:
+    """Whether what was done last before a seam hangs on another hook, which has been done again."""
+    return any(s.start_ns >= seam for s in recording.steps(f"{Hang.kind}{AGAIN}"))
+
+
+def _with(h: Hangings, at: tuple[int, int], again: tuple[Array, Array, Array]) -> Hangings:
+    """The hangings with other means of one of them."""
+    parts: list[Array] = []
+    for whole, one in zip((h.currents, h.positions, h.motor_m), again, strict=True):
+        changed = np.array(whole)
+        changed[(..., *at)] = one[..., 0, 0]
+        parts.append(changed)
+    return replace(h, currents=parts[0], positions=parts[1], motor_m=parts[2])
+
+
+def _scatter(recording: Recording[Plan], data: HangingData, f: Fit, p: Mapping[str, float]) -> Scatter:
+    """Of a hanging, freed of what drifted at a seam: there the zero of force may differ, by a term that the fit does not have,
+    so that a drift does not hide in the scatter that it makes. It takes a degree of freedom where a seam parts an angle."""
+    h, plan = data.hangings, recording.plan
+    start = data.table.start_ns
+    seams = [start > e["t_ns"] for e in recording.events(CONTINUED)]
+    parted = [after for after in seams if (after.any(axis=1) & ~after.all(axis=1)).any()]
+    design = terms_of(h, p, plan.bias_A, len(plan.masses))
+    after = (
+        np.stack([np.broadcast_to(one, design.shape[:-1]) for one in parted], axis=-1) if parted else design[..., :0]
+    )
+    wider = np.concatenate([design, after], axis=-1)
+    solvers = np.linalg.pinv(wider)
+    rest = f.forces - np.einsum("bapf,bafq,baq->bap", wider, solvers, f.forces)
+    found = scatter(replace(f, residuals=rest, solvers=solvers), h, len(plan.masses))
+    return replace(found, dof=found.dof - len(parted))
