@@ -66,6 +66,7 @@ PROCEDURES = (
     _room("emf-constant", "Flux and emf constants of a mover's motors, and what the nameplate's flux is meant of"),
     _room("map-zero", "Zeros of a reluctance machine's stators against its encoder, from both sides"),
     _room("inductance-map", "Map of a reluctance machine's inductances, by pulses at a locked rotor"),
+    _room("static-characteristics", "Static torque and force of a reluctance machine's phases, by load cells"),
     _room("coil-map", "Coils, phases and actuators: is each where the controller takes it to be?"),
     _room("load-response", "Static compliance, friction, deviation and return of a positioned stage under known loads"),
     _room("positioning", "Repeatability and accuracy of positioning after ISO 230-2, by a reference instrument"),

@@ -261,6 +261,14 @@ INDUCTANCE_MAP = (
     "Time is the controller's: a clock that is fast by 1e-4 makes fluxes smaller by that share.",
     "An encoder along that is off within its travel by more than its pitch: 1 µm at one place is 0.007 % of the overlap.",
 )
+STATIC_CHARACTERISTICS = (
+    "A gain that both load cells have alike, or one of a cell and its arm that make up for each other: force and torque by that share. "
+    "Only the map by flux stands against it.",
+    "Currents' readings that are all wrong by a share change force and torque of a current by twice that share.",
+    "Friction that is not alike from above and from below: half of the difference is taken for load, unless it is there without "
+    "currents, too.",
+    "An arm that is not at right angles to the cell: its cosine, 0.015 % for a degree.",
+)
 MAP_ZERO = (
     "Friction that differs by the way the shaft turns: a tenth more one way moves the zero by a tenth of the band.",
     "Inductance that grows to one side over the width of a tooth: the shaft comes to rest where it is greatest, and that is "
