@@ -26,6 +26,7 @@ UNITS = {"slope": "H/m", "length": "m", "overlap": "m", "fringe": "m", "zero": "
 FIRST = {"slope": 0.8, "unaligned": 0.15, "c2": 0.03, "c3": 0.09, "length": 0.028, "overlap": 0.014, "fringe": 1.5e-3,
          "saturation": 8.5}  # fmt: skip
 """Where the fit begins if the controller has no map."""
+ANGLES = 181  # of a tooth, on which the greatest torque is looked for: 0.01 % of it
 FREE = 30.0  # times its u, by which a cell's gain is let go to see what data alone say of it
 MAPPED = ("unaligned", "c2", "c3", "length", "overlap", "fringe", "centre", "saturation")
 
@@ -110,8 +111,9 @@ def greatest_loads(t: Array, of: Rows, current: float) -> tuple[Array, Array]:
     even = {**m, "cosine": 0.0, "sine": 0.0}
     x = np.full(PHASES, m["centre"])
     force = slopes(even, gain, of, k, x, of.aligned + zero)[1] * q
-    turned = np.linspace(0, math.pi / of.poles, 721)
-    around = np.array([slopes(even, gain, of, k, x, of.aligned + zero - d)[2] for d in turned])
+    turned, each = np.linspace(0, math.pi / of.poles, ANGLES), np.tile(k, ANGLES)
+    at = np.repeat(-turned, PHASES) + np.tile(of.aligned + zero, ANGLES)
+    around = slopes(even, gain, of, each, np.full(len(each), m["centre"]), at)[2].reshape(ANGLES, PHASES)
     return np.abs(force), around.max(axis=0) * q
 
 
@@ -222,7 +224,7 @@ def _parted(found: Found, known: Sequence[Known], kept: Sequence[Known], of: Row
     for j, one in enumerate(known):
         if counts[j] or one.identity not in keep:
             continue
-        influence = Influence(one.identity, _called(one.identity), one.u, "1", "B", "rectangular")
+        influence = Influence(one.identity, _called(one.identity), one.u, "1", "B", one.distribution)
         out = [e + Estimate(0.0, "", {influence: float(s)}) for e, s in zip(out, gains[:, j], strict=True)]
     freedom = float(max(len(of.x) * PHASES - len(MAP) - PHASES, 1))
     left = parts(found.scatter[np.ix_(rows, rows)], "scatter/loads", "scatter of the loads", "A", freedom)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.errors import AnalysisError
+from bench.rigfile.toleranced import Distribution
 from procedures.shared.leastsquares import nonlinear
 from procedures.static_characteristics.model import PHASES, Array, Rows, Terms, shown
 
@@ -29,6 +30,7 @@ class Known:
     value: float
     u: float
     identity: str
+    distribution: Distribution = "rectangular"
 
 
 @dataclass(frozen=True)

@@ -27,14 +27,16 @@ def _of_cells(at: Terms, rig: RigFile, both: tuple[Cell, Cell]) -> Iterator[Know
     for name, cell, other, give in (("x", along, around, "give_x"), ("angle", around, along, "give")):
         stem, by, term = f"capabilities/load_cells/{cell.axis.name}", cell.by, at.cell
         share = by.gain.standard_uncertainty / by.gain.value
-        yield Known(term(f"cell_{name}"), 1.0, max(share, EXACT), f"{stem}/gain")
+        yield Known(term(f"cell_{name}"), 1.0, max(share, EXACT), f"{stem}/gain", by.gain.distribution)
         cross = by.cross.get(other.axis.name)
         value, u = (0.0, 0.0) if cross is None else (cross.value / by.gain.value, cross.standard_uncertainty / by.gain.value)
-        yield Known(term(f"cross_{name}"), by.sign * value, max(u, EXACT), f"{stem}/cross/{other.axis.name}")
-        yield Known(term(give), by.give.value, max(by.give.standard_uncertainty, 1e-12), f"{stem}/give")
+        yield Known(term(f"cross_{name}"), value, max(u, EXACT), f"{stem}/cross/{other.axis.name}",
+                    "rectangular" if cross is None else cross.distribution)  # fmt: skip
+        yield Known(term(give), by.give.value, max(by.give.standard_uncertainty, 1e-12), f"{stem}/give", by.give.distribution)
     arm = rig.geometry[around.by.arm.removeprefix("geometry/")] if around.by.arm else None
     u = EXACT if arm is None else max(arm.standard_uncertainty / arm.value, EXACT)
-    yield Known(at.cell("arm"), 1.0, u, around.by.arm or f"capabilities/load_cells/{around.axis.name}/arm")
+    identity = around.by.arm or f"capabilities/load_cells/{around.axis.name}/arm"
+    yield Known(at.cell("arm"), 1.0, u, identity, "normal" if arm is None else arm.distribution)
 
 
 def _of_currents(at: Terms, rig: RigFile, some: Sequence[Phase]) -> Iterator[Known]:
@@ -42,14 +44,15 @@ def _of_currents(at: Terms, rig: RigFile, some: Sequence[Phase]) -> Iterator[Kno
         sensor = rig.sensors[phase.current]
         for name, stated, part in (("current", sensor.gain, "gain"), ("offset", sensor.offset, "offset")):
             u = max(stated.standard_uncertainty, EXACT)
-            yield Known(at.each(name).start + k, stated.value, u, f"sensors/{phase.current}/{part}")
+            identity = f"sensors/{phase.current}/{part}"
+            yield Known(at.each(name).start + k, stated.value, u, identity, stated.distribution)
 
 
 def _of_encoders(at: Terms, both: tuple[Cell, Cell]) -> Iterator[Known]:
     x, angle = (cell.axis for cell in both)
     wide = EXACT if angle.error is None else _half(angle.error) / math.sqrt(2)  # of each part of a sine
     for k, part in enumerate(("cosine", "sine")):
-        yield Known(at.once.start + k, 0.0, max(wide, EXACT), f"encoders/{angle.name}/error/{part}")
+        yield Known(at.once.start + k, 0.0, max(wide, EXACT), f"encoders/{angle.name}/error/{part}", "arcsine")
     count = 0.0 if angle.pitch is None else angle.pitch.value
     for p in range(at.places):
         yield Known(at.off.start + p, 0.0, max(COUNT * count, EXACT), f"counts/{angle.name}/{p}")
