@@ -73,6 +73,7 @@ PROCEDURES = (
     _room("step-following", "Steps of a positioned stage: static error, overshoot, settling"),
     _room("sine-following", "Sines that a positioned stage follows: errors, amplitude ratio, lag"),
     _room("axis-friction", "Friction of a stage's axes, alone and where both move, by known loads"),
+    _room("axis-breakaway", "Breakaway of a stage's axes by slow ramps, alone and both at once, by known loads"),
     _room("axis-inertia", "Mass and moment of inertia of what a stage moves, by sines and a known part"),
     _room("decoupling", "Decoupling of a stage's axes: what a held one does, and what force crosses over to it"),
     _room("force-map", "Terms of the motor's force over displacement, currents and load"),

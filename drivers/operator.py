@@ -130,7 +130,8 @@ class LineOperator:
         return self._read(f"cell {axis}", "read-cell", axis, instrument, unit)
 
     def wind(self, side: Literal["above", "below"]) -> None:
-        """Have the load cells that hold the shaft wound past their place and back to it from that side, and wait until they are.
+        """Have the load cells that hold the shaft wound past their place and back to it from that side, and wait until they
+        are.
 
         Raises:
             OperatorRefused: the other end cannot do it.

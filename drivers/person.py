@@ -186,7 +186,8 @@ class ConsoleOperator:
         Raises:
             OperatorAbort: the person answered stop.
         """
-        what = (f"Wind the load cells slowly past their place, {'up' if side == 'above' else 'down'} along and around, and back to "
+        what = (f"Wind the load cells slowly past their place, {'up' if side == 'above' else 'down'} along and around, "
+                f"and back to "
                 f"it from {side}: along first, around last.")  # fmt: skip
         self._confirmed(what, "they are at their place", None, _Other())
         if self._then is not None:

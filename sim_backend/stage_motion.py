@@ -62,8 +62,8 @@ class DecouplingAsked:
 
 @dataclass(frozen=True)
 class StaticsAsked:
-    """Loads of single phases on cells that hold a shaft: where encoders read `x` m and `angle` rad, the `phase` (a number) and its
-    true `current` A, each (n,); the `greatest` current. `beside`: the other map's force N and torque N m of each; none."""
+    """Loads of single phases on cells that hold a shaft: where encoders read `x` m and `angle` rad, the `phase` (a number) and
+    its true `current` A, each (n,); the `greatest` current. `beside`: the other map's force N and torque N m of each; none."""
 
     x: Sequence[float]
     angle: Sequence[float]

@@ -90,5 +90,6 @@ TRUTHS: Mapping[str, Callable[[Any], Found]] = {
     "inductance-map": reluctance.inductances,
     "static-characteristics": reluctance.statics,
     "axis-friction": friction.of_axes,
+    "axis-breakaway": friction.breakaway,
     "axis-inertia": friction.inertia,
 }

@@ -46,9 +46,17 @@ def _one(rig: RigFile, cell: LoadCell, turns: bool) -> Iterator[Line]:
     if cell.arm and not turns:
         yield "arm", cell.arm, "none: the axis goes along"
     elif cell.arm and cell.arm.removeprefix(LENGTHS) not in rig.geometry:
-        yield "arm", cell.arm, f"a length of this file, {LENGTHS}NAME{near(cell.arm.removeprefix(LENGTHS), rig.geometry)}"
+        yield (
+            "arm",
+            cell.arm,
+            f"a length of this file, {LENGTHS}NAME{near(cell.arm.removeprefix(LENGTHS), rig.geometry)}",
+        )
     if cell.gain.unit != "1" or cell.gain.value <= 0:
-        yield "gain", f"{cell.gain.value:g} {cell.gain.unit}", "a positive number without unit; sign = -1 turns it round"
+        yield (
+            "gain",
+            f"{cell.gain.value:g} {cell.gain.unit}",
+            "a positive number without unit; sign = -1 turns it round",
+        )
     if cell.noise is not None and (cell.noise.unit != si or cell.noise.value != 0):
         yield "noise", f"{cell.noise.value:g} {cell.noise.unit}", f"a value of 0 in {si}, with how far it may be off"
     give = "rad/(N m)" if turns else "m/N"

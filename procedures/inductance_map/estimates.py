@@ -13,7 +13,7 @@ from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
 from procedures.inductance_map import fit
 from procedures.inductance_map.fit import Found, Known
-from procedures.inductance_map.model import MAP, PHASES, Array, Rows, Terms
+from procedures.inductance_map.model import MAP, PHASES, Rows, Terms
 from procedures.inductance_map.steps import Taken, rows
 from procedures.shared.certificates import certified_gain
 from procedures.shared.joint import parts
@@ -144,4 +144,3 @@ def _freedom(of: Rows) -> float:
     """Pulses less terms that have no certificate."""
     pulses = len(np.unique(of.place * PHASES + of.phase))
     return float(max(pulses - len(MAP) - 3 * PHASES, 1))
-

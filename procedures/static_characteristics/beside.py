@@ -1,7 +1,7 @@
 """Another map that force and torque are held against: the one that pulses found by flux, or the controller's own.
 
-Pulses know flux, cells force: what ties them is the co-energy, no certificate but that of the currents. So forces by that map are
-a prediction, and the ratio is a check of all that both rest on.
+Pulses know flux, cells force: what ties them is the co-energy, no certificate but that of the currents. So forces by that map
+are a prediction, and the ratio is a check of all that both rest on.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ TURNED = ("cosine", "sine")
 
 @dataclass(frozen=True)
 class Beside:
-    """A map by the numbers of the formula, `estimates` in the order of `MAP` and then gains by phase; `by` what it is called."""
+    """A map by the numbers of the formula, `estimates` in the order of `MAP` and then gains by phase; `by` what it is
+    called."""
 
     by: str
     estimates: tuple[Estimate, ...]
@@ -42,7 +43,10 @@ def by_flux(found: Mapping[str, Estimate], some: Sequence[Phase]) -> Beside | No
     """Of a calibration by `inductance-map`; None where it lacks a number."""
     stators = list(dict.fromkeys(p.motor for p in some))
     zeros = {f"zero_{k + 1}": f"zero@{stator}" for k, stator in enumerate(stators)}
-    wanted = [*(zeros.get(name, f"uneven@{name}" if name in TURNED else name) for name in MAP), *(f"gain@{p.name}" for p in some)]
+    wanted = [
+        *(zeros.get(name, f"uneven@{name}" if name in TURNED else name) for name in MAP),
+        *(f"gain@{p.name}" for p in some),
+    ]
     if any(name not in found for name in wanted):
         return None
     return Beside("the map by flux", tuple(found[name] for name in wanted))

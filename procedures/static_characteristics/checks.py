@@ -33,7 +33,8 @@ def of_signals(t: Taken, rig: RigFile, plan: Plan) -> Iterator[Finding]:
     """Nothing read, another state, losses, currents that are not there."""
     there = np.isfinite(t.loads).all(axis=(1, 2, 3)) & np.isfinite(t.currents).all(axis=(1, 2, 3))
     if there.sum() < len(t.places) or len(t.places) < FEWEST:
-        text = f"found readings of {int(there.sum())} places; expected {max(FEWEST, len(t.places))} (was the run stopped early?)"
+        text = (f"found readings of {int(there.sum())} places; expected {max(FEWEST, len(t.places))} (was the run "
+                "stopped early?)")  # fmt: skip
         yield Finding("readings-missing", text, "", Effect.ERROR)
         return
     if other := [s for s in t.states if rig.binding.mode(s) != READY]:
@@ -60,13 +61,16 @@ def of_order(t: Taken, rig: RigFile) -> Iterator[Finding]:
     of, some = rows(t, rig, both), phases(rig)
     expected = [_expected(of, np.full(len(of.phase), k)) for k in range(len(some))]
     for axis, cell in enumerate(both):
-        alike = _alike(np.array([e[axis] for e in expected])[of.phase, np.arange(len(of.phase))], (of.force, of.torque)[axis])
+        alike = _alike(
+            np.array([e[axis] for e in expected])[of.phase, np.arange(len(of.phase))], (of.force, of.torque)[axis]
+        )
         if alike < -LEAST:
             text = f"{cell.by.instrument} reads less where the phases should press more."
             yield Finding("cell-reversed", text, cell.axis.name, Effect.ERROR)
             return
         if alike < LEAST:
-            text = (f"{cell.by.instrument} does not go with the currents, correlation {alike:.2f}: does it hold the shaft, and does it "
+            text = (f"{cell.by.instrument} does not go with the currents, correlation {alike:.2f}: does it hold the "
+                    f"shaft, and does it "
                     "show N?")  # fmt: skip
             yield Finding("cell-does-not-hold", text, cell.axis.name, Effect.ERROR)
             return
@@ -75,7 +79,8 @@ def of_order(t: Taken, rig: RigFile) -> Iterator[Finding]:
         goes = [min(_alike(e[0][mine], of.force[mine]), _alike(e[1][mine], of.torque[mine])) for e in expected]
         best = int(np.argmax(goes))
         if goes[best] > goes[k] + BETTER:
-            text = f"what it presses is what {some[best].name} should: phases are exchanged, or the encoder's zero is another one."
+            text = (f"what it presses is what {some[best].name} should: phases are exchanged, or the encoder's zero is another "
+                    "one.")  # fmt: skip
             yield Finding("phase-elsewhere", text, phase.name, Effect.ERROR)
 
 
@@ -98,19 +103,23 @@ def of_readings(t: Taken, plan: Plan) -> Iterator[Finding]:
     least = slice(1, None, len(plan.levels_A))
     loads = less_zeros(t).mean(axis=2)
     for name, values, axis in (("along", along, 0), ("around", around, 1)):
-        most = float(np.abs(loads[:, 1:-1, axis][:, ::len(plan.levels_A)]).max())
+        most = float(np.abs(loads[:, 1:-1, axis][:, :: len(plan.levels_A)]).max())
         rubs = float(np.abs(values[:, least]).mean())
         if rubs > plan.max_held * most:
-            text = (f"friction holds {rubs:.3g} of up to {most:.3g} that {plan.levels_A[0]:g} A press, in N or N m: what is left is a "
+            text = (f"friction holds {rubs:.3g} of up to {most:.3g} that {plan.levels_A[0]:g} A press, in N or N m: "
+                    f"what is left is a "
                     "difference of both sides. Greater currents.")  # fmt: skip
             yield Finding("friction-hides-load", text, name, Effect.INDETERMINATE)
         off = values - np.median(values)
         scatter = max(1.4826 * float(np.median(np.abs(off))), 1e-3 * most)
         place, load = np.unravel_index(int(np.argmax(np.abs(off))), off.shape)
         if abs(off[place, load]) > plan.far * scatter:
-            text = (f"both sides differ by {2 * values[place, load]:.3g} there, and by {2 * np.median(values):.3g} elsewhere, in N or "
+            text = (f"both sides differ by {2 * values[place, load]:.3g} there, and by {2 * np.median(values):.3g} "
+                    f"elsewhere, in N or "
                     "N m: mistyped, or something touches.")  # fmt: skip
-            yield Finding("reading-far", text, f"{name}, {t.places[int(place)].name}, load {int(load)}", Effect.INDETERMINATE)
+            yield Finding(
+                "reading-far", text, f"{name}, {t.places[int(place)].name}, load {int(load)}", Effect.INDETERMINATE
+            )
 
 
 def of_results(r: Result, plan: Plan) -> Iterator[Finding]:
@@ -119,7 +128,8 @@ def of_results(r: Result, plan: Plan) -> Iterator[Finding]:
     for name, left, load in zip(("along", "around"), r.found.residuals, (r.rows.force, r.rows.torque), strict=True):
         share = float(np.sqrt(np.mean(left**2)) / np.abs(load).max())
         if share > plan.max_residual:
-            text = (f"loads lie {share:.2%} (rms) of the greatest one beside the formula; {plan.max_residual:.2%} is allowed: the shaft was "
+            text = (f"loads lie {share:.2%} (rms) of the greatest one beside the formula; {plan.max_residual:.2%} is "
+                    f"allowed: the shaft was "
                     "not wound far enough, or the map has another form.")  # fmt: skip
             yield Finding("loads-beside-formula", text, name, Effect.INDETERMINATE)
     yield from _reciprocity(r)
@@ -132,7 +142,8 @@ def _certificates(r: Result) -> Iterator[Finding]:
     for identity, pull in fit.pulls(r.found, r.known).items():
         if abs(pull) > APART and kinds[identity] in TOLD:
             one = next(k for k in r.known if k.identity == identity)
-            text = (f"loads say {r.found.terms[one.term]:.5g}; the certificate says {one.value:.5g}, u {one.u:.2g}: {pull:+.1f} standard "
+            text = (f"loads say {r.found.terms[one.term]:.5g}; the certificate says {one.value:.5g}, u {one.u:.2g}: "
+                    f"{pull:+.1f} standard "
                     "uncertainties off.")  # fmt: skip
             yield Finding(TOLD[kinds[identity]], text, identity, Effect.INDETERMINATE)
 
@@ -149,10 +160,13 @@ def _reciprocity(r: Result) -> Iterator[Finding]:
     """Both cells read the slopes of one co-energy, whatever the map is."""
     e = r.estimates["reciprocity", ""]
     at = Terms(len(r.rows.x))
-    stated = float(np.sqrt(sum(k.u**2 for k in r.known if k.term in (at.cell("cell_x"), at.cell("cell_angle"), at.cell("arm")))))
+    stated = float(
+        np.sqrt(sum(k.u**2 for k in r.known if k.term in (at.cell("cell_x"), at.cell("cell_angle"), at.cell("arm"))))
+    )
     off = (e.value - 1) / np.hypot(e.u, stated)
     if abs(off) > APART:
-        text = (f"the torque grows along by {e.value:.4f} of what the force grows around; certificates allow 1 to {stated:.2g}: a cell's "
+        text = (f"the torque grows along by {e.value:.4f} of what the force grows around; certificates allow 1 to "
+                f"{stated:.2g}: a cell's "
                 "gain or the arm is not what they say.")  # fmt: skip
         yield Finding("cells-disagree", text, "", Effect.INDETERMINATE, CONCERNED)
 
@@ -165,7 +179,7 @@ def _beside(r: Result) -> Iterator[Finding]:
     text = f"by load cells force is {force.value:.4f} and torque {torque.value:.4f} of what {r.beside.by} says."
     apart = any(abs(e.value - 1) > RATIO * e.u for e in (force, torque))
     if apart and any(e.u for e in r.beside.estimates):
-        yield Finding("co-energy-apart", f"{text} Its uncertainties and those of the cells do not allow that.", "", Effect.INDETERMINATE,
-                      CONCERNED)  # fmt: skip
+        text = f"{text} Its uncertainties and those of the cells do not allow that."
+        yield Finding("co-energy-apart", text, "", Effect.INDETERMINATE, CONCERNED)
     else:
         yield Finding("beside-other-map", text, "")

@@ -19,7 +19,7 @@ from procedures.static_characteristics.fit import Found, Known
 from procedures.static_characteristics.known import certificates
 from procedures.static_characteristics.model import MAP, PHASES, Array, Rows, Terms, held_at, q_of, slopes
 from procedures.static_characteristics.readings import held, rows
-from procedures.static_characteristics.steps import Cell, Taken, cells
+from procedures.static_characteristics.steps import Taken, cells
 
 UNITS = {"slope": "H/m", "length": "m", "overlap": "m", "fringe": "m", "zero": "rad", "centre": "m", "saturation": "A",
          "give": "rad/(N m)", "give_x": "m/N", "force": "N", "torque": "N m", "held": "N", "held_angle": "N m"}  # fmt: skip
@@ -58,7 +58,7 @@ def result(taken: Taken, rig: RigFile, greatest: float, beside: Beside | None) -
     found = fit.fitted(of, start(of, rig, known), known)
     out = _of_terms(found, known, of, some, greatest)
     if beside is not None:
-        out |= _beside(found, known, of, beside)
+        out |= beside_of(found, known, of, beside)
     out["reciprocity", ""] = _reciprocity(found, known, of)
     for name, values in zip(("held", "held_angle"), held(taken), strict=True):
         out[name, ""] = _scattered(name, values[:, 1:-1])
@@ -119,7 +119,8 @@ def greatest_loads(t: Array, of: Rows, current: float) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class Held:
-    """Every load (n,) as it was found: true places and current, and what the other map says of it, N and N m; none without one."""
+    """Every load (n,) as it was found: true places and current, and what the other map says of it, N and N m; none without
+    one."""
 
     x: Array
     angle: Array
@@ -149,7 +150,7 @@ def loads_by(m: Mapping[str, float], gain: Array, of: Rows, where: tuple[Array, 
     return along * q, around * q
 
 
-def _beside(found: Found, known: Sequence[Known], of: Rows, other: Beside) -> dict[tuple[str, str], Estimate]:
+def beside_of(found: Found, known: Sequence[Known], of: Rows, other: Beside) -> dict[tuple[str, str], Estimate]:
     """Force and torque by cells over those of the other map, over all loads that were read."""
     at = Terms(len(of.x))
     term = terms(found, known, of, at.each("offset").stop)
@@ -213,7 +214,9 @@ def terms(found: Found, known: Sequence[Known], of: Rows, count: int) -> list[Es
     return _parted(found, known, known, of, range(count))
 
 
-def _parted(found: Found, known: Sequence[Known], kept: Sequence[Known], of: Rows, told: Sequence[int]) -> list[Estimate]:
+def _parted(
+    found: Found, known: Sequence[Known], kept: Sequence[Known], of: Rows, told: Sequence[int]
+) -> list[Estimate]:
     """Terms by number, with the influences of the certificates that are `kept`, counts and scatter."""
     rows, keep = list(told), {k.identity for k in kept}
     counts = np.array([k.identity.startswith("counts/") for k in known])

@@ -21,8 +21,8 @@ def all_figures(r: Result) -> Iterator[Shown]:
 
 
 def _loads(r: Result, axis: int) -> Figure:
-    """Of all phases by their own gains, at the greatest current, over the angle from where each is aligned; torque over the depth in
-    its stator, which it goes with."""
+    """Of all phases by their own gains, at the greatest current, over the angle from where each is aligned; torque over the
+    depth in its stator, which it goes with."""
     of, t = r.rows, r.found.terms
     m, gain = dict(zip(MAP, t, strict=False)), t[Terms(len(of.x)).each("gain")]
     zero = np.where(of.stator == 0, m["zero_1"], m["zero_2"])
@@ -32,16 +32,19 @@ def _loads(r: Result, axis: int) -> Figure:
     load, left = (of.force, of.torque)[axis] / per, r.found.residuals[axis]
     greatest = np.abs((of.force, of.torque)[axis]).max()
     line = np.linspace(-period / 2, period / 2, POINTS)
-    points = tuple(Series(p.name, np.degrees(d[of.phase == k]), load[of.phase == k], "points") for k, p in enumerate(r.phases))
+    points = tuple(
+        Series(p.name, np.degrees(d[of.phase == k]), load[of.phase == k], "points") for k, p in enumerate(r.phases)
+    )
     below = Figure(
         "residuals", "Residuals", "", "angle from the aligned one / °", "beyond the formula / % of the greatest",
         tuple(Series(p.name, np.degrees(d[of.phase == k]), 100 * left[of.phase == k] / greatest, "points")
               for k, p in enumerate(r.phases)),
     )  # fmt: skip
     name, unit = (("Force", "H/m"), ("Torque", "H/(m rad)"))[axis]
-    caption = (f"{name} by load cells over what the current makes of it, over the phase's gain"
-               f"{' and over its depth in the stator' if axis else ' towards its stator'}; the line is the formula.")  # fmt: skip
-    return Figure(name.lower(), f"{name} of the phases", caption, "angle from the aligned one / °", f"{name.lower()} / ({unit})",
+    caption = (f"{name} by load cells over what the current makes of it, over the phase's gain "
+               f"{'and over its depth in the stator' if axis else 'towards its stator'}; the line is the formula.")  # fmt: skip
+    label = f"{name.lower()} / ({unit})"
+    return Figure(name.lower(), f"{name} of the phases", caption, "angle from the aligned one / °", label,
                   (*points, Series("formula", np.degrees(line), _curve(m, of, line, axis), "line")), below=below)  # fmt: skip
 
 

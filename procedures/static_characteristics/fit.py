@@ -1,7 +1,7 @@
 """Weighted least squares of map, cells and readings over all loads, with what certificates say as observations of their own.
 
-The value of a certificate is an observation with its u, so that the covariance has everything, and the row of a term in (J'J)^-1
-J' is what each certificate does to it. Where data know better than a certificate, its term says so: `pulls`.
+The value of a certificate is an observation with its u, so that the covariance has everything, and the row of a term in
+(J'J)^-1 J' is what each certificate does to it. Where data know better than a certificate, its term says so: `pulls`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from procedures.static_characteristics.model import PHASES, Array, Rows, Terms, 
 
 SHARE = 5e-4  # of a load, beside noise: what rounding of currents and friction leave of it
 TIED = 1e-6  # of the mean of the gains
-KNOWING = 0.8  # of a certificate's u: what data leave of it where they know better
+KNOWING = 0.98  # of a certificate's u: where data leave more of it, they say nothing
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,9 @@ class Known:
 @dataclass(frozen=True)
 class Found:
     """Terms and covariance; `gains` (terms, known), what each certificate does to each term; `scatter` (terms, terms), the part
-    of the covariance that residuals make; `residuals` (n,) N and (n,) N m, and their size in units of what was expected."""
+    of the covariance that residuals make; `residuals` (n,) N and (n,) N m, and their size in units of what was expected.
+    `expected`: terms and variances as they are by what was expected, whatever was found: what the formula lacks would make
+    every term uncertain, and say nothing against any."""
 
     terms: Array
     covariance: Array
@@ -44,6 +46,7 @@ class Found:
     scatter: Array
     residuals: tuple[Array, Array]
     size: float
+    expected: tuple[Array, Array]
 
 
 def fitted(rows: Rows, first: Array, known: Sequence[Known]) -> Found:
@@ -64,9 +67,11 @@ def fitted(rows: Rows, first: Array, known: Sequence[Known]) -> Found:
     def model(t: Array) -> Array:
         return np.concatenate([*shown(t, rows), t[numbers], [t[at.each("gain")].mean()]])
 
-    for _ in range(2):  # the second by what the residuals of the first are
+    expected = (terms, np.ones(at.count))
+    for again in range(2):  # the second by what the residuals of the first are
         weight = np.concatenate([size * base, u, [TIED]])
         found = nonlinear(model, observed, terms, weight)
+        expected = expected if again else (found.terms, np.diag(found.covariance))
         terms = found.terms
         left = found.residuals[: 2 * n]
         size = math.sqrt(float(((left / base) ** 2).sum()) / max(2 * n - (at.count - len(known)), 1))
@@ -74,7 +79,9 @@ def fitted(rows: Rows, first: Array, known: Sequence[Known]) -> Found:
             raise AnalysisError("residuals are not finite")
     by = found.covariance @ (found.jacobian / weight[:, None]).T / weight  # what each observation does to each term
     scatter = _by_phases(by[:, : 2 * n], found.jacobian[: 2 * n], rows, left)
-    return Found(terms, found.covariance, by[:, 2 * n : 2 * n + len(known)], scatter, (left[:n], left[n:]), size)
+    return Found(
+        terms, found.covariance, by[:, 2 * n : 2 * n + len(known)], scatter, (left[:n], left[n:]), size, expected
+    )
 
 
 def _by_phases(by: Array, jacobian: Array, rows: Rows, left: Array) -> Array:
@@ -91,10 +98,11 @@ def _by_phases(by: Array, jacobian: Array, rows: Rows, left: Array) -> Array:
 
 
 def pulls(found: Found, known: Sequence[Known]) -> dict[str, float]:
-    """By identity of the certificates that data know better: how far off they are, in standard uncertainties of the difference."""
-    out = {}
+    """By identity of the certificates that data know better: how far off they are, in standard uncertainties of the
+    difference."""
+    out, (terms, variances) = {}, found.expected
     for one in known:
-        left = found.covariance[one.term, one.term]
+        left = float(variances[one.term])
         if left < (KNOWING * one.u) ** 2:
-            out[one.identity] = float((found.terms[one.term] - one.value) / math.sqrt(one.u**2 - left))
+            out[one.identity] = float(terms[one.term] - one.value) / math.sqrt(one.u**2 - left)
     return out

@@ -29,10 +29,14 @@ def _of_cells(at: Terms, rig: RigFile, both: tuple[Cell, Cell]) -> Iterator[Know
         share = by.gain.standard_uncertainty / by.gain.value
         yield Known(term(f"cell_{name}"), 1.0, max(share, EXACT), f"{stem}/gain", by.gain.distribution)
         cross = by.cross.get(other.axis.name)
-        value, u = (0.0, 0.0) if cross is None else (cross.value / by.gain.value, cross.standard_uncertainty / by.gain.value)
+        value, u = (
+            (0.0, 0.0) if cross is None else (cross.value / by.gain.value, cross.standard_uncertainty / by.gain.value)
+        )
         yield Known(term(f"cross_{name}"), value, max(u, EXACT), f"{stem}/cross/{other.axis.name}",
                     "rectangular" if cross is None else cross.distribution)  # fmt: skip
-        yield Known(term(give), by.give.value, max(by.give.standard_uncertainty, 1e-12), f"{stem}/give", by.give.distribution)
+        yield Known(
+            term(give), by.give.value, max(by.give.standard_uncertainty, 1e-12), f"{stem}/give", by.give.distribution
+        )
     arm = rig.geometry[around.by.arm.removeprefix("geometry/")] if around.by.arm else None
     u = EXACT if arm is None else max(arm.standard_uncertainty / arm.value, EXACT)
     identity = around.by.arm or f"capabilities/load_cells/{around.axis.name}/arm"

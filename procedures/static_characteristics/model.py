@@ -38,9 +38,10 @@ EACH = ("gain", "current", "offset")
 
 @dataclass(frozen=True)
 class Rows:
-    """Every load that was read (n,): `phase`, `place` (numbers), `current` A as read, `force` N and `torque` N m as cells show them
-    less what they show without currents; of each place (m,) the readings `x` m and `angle` rad; of each phase (6,) `side`, `stator`,
-    `aligned` as `stators.Phase` has them; the rotor's `poles`; `reach` m of the arm, 1 without one; `noise` (2,) of a load, N and N m."""
+    """Every load that was read (n,): `phase`, `place` (numbers), `current` A as read, `force` N and `torque` N m as cells show
+    them less what they show without currents; of each place (m,) the readings `x` m and `angle` rad; of each phase (6,) `side`,
+    `stator`, `aligned` as `stators.Phase` has them; the rotor's `poles`; `reach` m of the arm, 1 without one; `noise` (2,) of
+    a load, N and N m."""
 
     phase: Index
     place: Index
@@ -100,7 +101,9 @@ def q_of(current: Array, saturation: float) -> Array:
     return out
 
 
-def slopes(m: Mapping[str, float], gain: Array, rows: Rows, k: Index, x: Array, angle: Array) -> tuple[Array, Array, Array]:
+def slopes(
+    m: Mapping[str, float], gain: Array, rows: Rows, k: Index, x: Array, angle: Array
+) -> tuple[Array, Array, Array]:
     """G H of phases `k` at `x` m and `angle` rad, with its slopes along H/m and around H/rad."""
     side = rows.side[k]
     d = angle - rows.aligned[k] - np.where(rows.stator[k] == 0, m["zero_1"], m["zero_2"])

@@ -1,8 +1,8 @@
 """Static torque and force of a reluctance machine's phases over place, angle and current, by load cells that hold the shaft.
 
-Measurands: the constants of the map's formula by force and torque (`static_...`), beside those that `inductance-map` has by flux;
-what each phase gives at the magnetic centre by the plan's greatest current; force and torque by cells over those of the other
-map; what both cells say of one field; how far the cells yield, and what friction held in the readings.
+Measurands: the constants of the map's formula by force and torque (`static_...`), beside those that `inductance-map` has by
+flux; what each phase gives at the magnetic centre by the plan's greatest current; force and torque by cells over those of the
+other map; what both cells say of one field; how far the cells yield, and what friction held in the readings.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ MEASURES = (
     Quantity("force", "N", "of an aligned phase at the magnetic centre, by the plan's greatest current"),
     Quantity("torque", "N m", "the greatest of a phase at the magnetic centre, by the plan's greatest current"),
     Quantity("static_gain", "1", "a phase's force and torque relative to the mean of all"),
-    Quantity("static_slope", "H/m", "inductance of an aligned phase per metre of overlap, by force and torque; mean of the phases"),
+    Quantity("static_slope", "H/m", "inductance per metre of overlap of an aligned phase, by force and torque; mean of all"),
     Quantity("static_saturation", "A", "current at which teeth saturate, by force and torque"),
     Quantity("static_unaligned", "1", "inductance midway between aligned angles, of the aligned"),
     Quantity("static_c2", "1", "second harmonic of the angle, of the first"),
@@ -106,7 +106,9 @@ def _carry(rig: Rig, phase: float, load: Load) -> None:
         rig.motion.write({test.current: load.level})
 
 
-def _read(rig: Rig, plan: Plan, record: Recorder, both: tuple[Cell, Cell], number: int, labels: Mapping[str, object]) -> None:
+def _read(
+    rig: Rig, plan: Plan, record: Recorder, both: tuple[Cell, Cell], number: int, labels: Mapping[str, object]
+) -> None:
     shown = {}
     with record.step(READING, number=number, **labels):
         for cell in both:
@@ -159,7 +161,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     for level in plan.levels_A:
         yield from envelope.problems_of({test.current: level})
     if len(set(plan.positions_m)) < 3 or len(grid(plan)) < checks.FEWEST:
-        yield (f"positions_m: found {len(set(plan.positions_m))} different ones, {len(grid(plan))} places; expected 3 or more, at both "
+        yield (f"positions_m: found {len(set(plan.positions_m))} different ones, {len(grid(plan))} places; expected 3 "
+               f"or more, at both "
                f"ends too, and {checks.FEWEST} places")  # fmt: skip
     if list(plan.levels_A) != sorted(set(plan.levels_A)) or min(plan.levels_A) <= 0:
         yield f"levels_A: found {', '.join(f'{a:g}' for a in plan.levels_A)}; expected them ascending from above 0"
@@ -187,9 +190,13 @@ def requires(rig: RigFile) -> Requires:
         capabilities=wanted,
         lacks=(*lacks(rig, 2), *(f"capabilities.load_cells: found none of {name}" for name in without),
                *(("capabilities.phase_test: found no current",) if not test.current else ()),
-               *(() if len(some) == 6 else (f"capabilities.phase_test.phases: found {len(some)} of known motors; expected 6",))),
+               *_six(len(some))),
         uses=("model",),
     )  # fmt: skip
+
+
+def _six(found: int) -> tuple[str, ...]:
+    return () if found == 6 else (f"capabilities.phase_test.phases: found {found} of known motors; expected 6",)
 
 
 def untold(rig: RigFile) -> tuple[Quantity, ...]:

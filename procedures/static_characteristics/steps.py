@@ -38,10 +38,10 @@ class Cell:
 
 @dataclass(frozen=True)
 class Taken:
-    """Of m places, l loads of `phases` with levels, 0 for nothing, as `places.loads` has them: `loads` (m, l, 2, 2), places, loads,
-    sides, axis along and around, N and N m as cells show them by their signs, gains and arms as stated; `times` s and `currents` A
-    (m, l, 2, 6) of all phases; what encoders read without currents, `x` m and `angle` rad (m,), and by how much they moved at
-    most under a current, `went` m and rad. NaN where there is none."""
+    """Of m places, l loads of `phases` with levels, 0 for nothing, as `places.loads` has them: `loads` (m, l, 2, 2), places,
+    loads, sides, axis along and around, N and N m as cells show them by their signs, gains and arms as stated; `times` s and
+    `currents` A (m, l, 2, 6) of all phases; what encoders read without currents, `x` m and `angle` rad (m,), and by how much
+    they moved at most under a current, `went` m and rad. NaN where there is none."""
 
     places: Sequence[Place]
     phases: Sequence[Phase]

@@ -188,5 +188,6 @@ RLSRM = Machine(
     radial=slice(0, 0), integral_gains=frozenset(("ki_x", "ki_angle")), turns=False, channels=CHANNELS, places=places,
     spoil=spoil, supply_V=90.0, windings={}, copper_W=copper_W, operator=operator, traced=lambda _: READINGS, daily=DAILY,
     controls=SETTABLE, levitates=False, tick_s=1 / TICKS_S, period_s=LOOP_TICKS / TICKS_S, states=states,
-    motions=Motions(loads=loads, inductances=of_map, stators=of_zeros, statics=statics, following=following, decoupling=decoupling),
+    motions=Motions(loads=loads, inductances=of_map, stators=of_zeros, statics=statics, following=following,
+    decoupling=decoupling),
 )  # fmt: skip

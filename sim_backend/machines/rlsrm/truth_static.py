@@ -22,16 +22,24 @@ ANGLES: Final = 721
 def statics(rig: RigFile, drawn: Any, asked: StaticsAsked) -> Mapping[tuple[str, str], float]:
     """By quantity of `static-characteristics` and where."""
     v, known = drawn.values, read_frame(drawn.plant.plant)
-    out = {(f"static_{name}", where): value for (name, where), value in of_map(rig, drawn).items() if name not in PULSED}
+    out = {
+        (f"static_{name}", where): value for (name, where), value in of_map(rig, drawn).items() if name not in PULSED
+    }
     out |= {("cell_give_x", ""): v["load_cells.x.give"], ("cell_give", ""): v["load_cells.angle.give"]}
     cells, arm = rig.capabilities.load_cells, cells_arm(rig)
     gains = {axis: v[f"load_cells.{axis}.gain"] / cells[axis].gain.value for axis in ("x", "angle")}
-    out["reciprocity", ""] = gains["angle"] / gains["x"] / (v["geometry." + arm] / rig.geometry[arm].value if arm else 1.0)
+    out["reciprocity", ""] = (
+        gains["angle"] / gains["x"] / (v["geometry." + arm] / rig.geometry[arm].value if arm else 1.0)
+    )
     for k, name in enumerate(PHASES):
         out["force", name], out["torque", name] = _greatest(known, k, asked.greatest)
     if asked.beside is not None:
-        own = np.array([_loads(known, *one) for one in zip(asked.x, asked.angle, asked.phase, asked.current, strict=True)])
-        for name, true, other in zip(("force_ratio", "torque_ratio"), own.T, map(np.asarray, asked.beside), strict=True):
+        own = np.array(
+            [_loads(known, *one) for one in zip(asked.x, asked.angle, asked.phase, asked.current, strict=True)]
+        )
+        for name, true, other in zip(
+            ("force_ratio", "torque_ratio"), own.T, map(np.asarray, asked.beside), strict=True
+        ):
             out[name, ""] = float(true @ other / (other @ other))
     return out
 
