@@ -49,6 +49,8 @@ UNITS: dict[str, Unit] = {
     "N m": Unit("N m"), "Nm": Unit("N m"), "mN m": Unit("N m", 1e-3), "mNm": Unit("N m", 1e-3),
     "N m/A": Unit("N m/A"), "N m s/rad": Unit("N m s/rad"), "N s/m": Unit("N s/m"), "N/(m s)": Unit("N/(m s)"),
     "N m/rad": Unit("N m/rad"), "N m/(rad s)": Unit("N m/(rad s)"),
+    "m/N": Unit("m/N"), "um/N": Unit("m/N", 1e-6), "µm/N": Unit("m/N", 1e-6),
+    "rad/(N m)": Unit("rad/(N m)"), "mrad/(N m)": Unit("rad/(N m)", 1e-3),
     "H/m": Unit("H/m"), "m/rad": Unit("m/rad"), "rad/m": Unit("rad/m"), "1/m": Unit("1/m"),
     "V/A": Unit("V/A"), "A/V": Unit("A/V"), "V/(A s)": Unit("V/(A s)"), "A/(V s)": Unit("A/(V s)"), "Wb": Unit("Wb"),
     "uH": Unit("H", 1e-6), "µH": Unit("H", 1e-6), "F": Unit("F"), "uF": Unit("F", 1e-6), "µF": Unit("F", 1e-6),

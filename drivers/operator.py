@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal
 
 from bench.clock import Clock
 from bench.errors import OperatorRefused
@@ -17,7 +17,7 @@ from drivers.answers import reading_of
 class LineOperator:
     """An operator that answers lines: `hang M2`, `hang -`, `hang HOOK M2`, `turn DEGREES`, `push DEGREES`,
     `push -`, `lever left M2`, `lever left -`, `mount ring`, `mount -`,
-    `attach inboard KG RAD`, `detach inboard`, `read AXIS`,
+    `attach inboard KG RAD`, `detach inboard`, `read AXIS`, `cell AXIS`, `wind above`,
     `ask TEXT` (see the simulated backend's operators). `may_touch` raises while
     nobody may reach into the machine; `approach` makes sure of what holds a voltage in it, before anything is asked for, and
     tells by what."""
@@ -119,7 +119,28 @@ class LineOperator:
         Raises:
             OperatorRefused: the other end cannot do it, or answers something else.
         """
-        answer = self._request(f"read {axis}")
+        return self._read(f"read {axis}", "read", axis, instrument, unit)
+
+    def read_cell(self, axis: str, instrument: str, unit: str) -> float:
+        """What a load cell that holds an axis shows now, SI, as `read`.
+
+        Raises:
+            OperatorRefused: the other end cannot do it, or answers something else.
+        """
+        return self._read(f"cell {axis}", "read-cell", axis, instrument, unit)
+
+    def wind(self, side: Literal["above", "below"]) -> None:
+        """Have the load cells that hold the shaft wound past their place and back to it from that side, and wait until they
+        are.
+
+        Raises:
+            OperatorRefused: the other end cannot do it.
+        """
+        self._do(f"wind {side}", f"wind the load cells to their place from {side}")
+        self._note(action="wind", side=side)
+
+    def _read(self, line: str, action: str, axis: str, instrument: str, unit: str) -> float:
+        answer = self._request(line)
         shown = (
             reading_of(answer.split(maxsplit=2)[2], unit)
             if answer.startswith("ok ") and answer.count(" ") >= 2
@@ -130,7 +151,7 @@ class LineOperator:
             what = f"the operator was asked to read {instrument} of axis {axis}"
             raise OperatorRefused(f"{what} and answers {told!r}; expected ok SECONDS NUMBER UNIT")
         self._clock.sleep(float(answer.split()[1]))
-        self._note(action="read", axis=axis, value=shown)
+        self._note(action=action, axis=axis, value=shown)
         return shown
 
     def _do(self, line: str, what: str) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Generic, TypeVar
+from typing import Generic, Literal, TypeVar
 
 from bench.clock import Clock
 from bench.errors import InterlockError, OperatorAbort
@@ -168,6 +168,32 @@ class ConsoleOperator:
         """
         if self._then is not None:
             return self._then.read(axis, instrument, unit)
+        return self._typed(axis, instrument, unit)
+
+    def read_cell(self, axis: str, instrument: str, unit: str) -> float:
+        """What a load cell that holds an axis shows now, SI, as `read`.
+
+        Raises:
+            OperatorAbort: the person answered stop.
+        """
+        if self._then is not None:
+            return self._then.read_cell(axis, instrument, unit)
+        return self._typed(axis, instrument, unit)
+
+    def wind(self, side: Literal["above", "below"]) -> None:
+        """Ask for the load cells that hold the shaft to be wound past their place and back to it from that side.
+
+        Raises:
+            OperatorAbort: the person answered stop.
+        """
+        what = (f"Wind the load cells slowly past their place, {'up' if side == 'above' else 'down'} along and around, "
+                f"and back to "
+                f"it from {side}: along first, around last.")  # fmt: skip
+        self._confirmed(what, "they are at their place", None, _Other())
+        if self._then is not None:
+            self._then.wind(side)
+
+    def _typed(self, axis: str, instrument: str, unit: str) -> float:
         asked = after(self.standing(), f"Read {instrument} of axis {axis}; do not touch the machine.")
         question = f"{asked}\nType the number, in {unit} or with its unit; stop ends the run."
         answer = self._answer(question)

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from bench.rigfile import RigFile
 from sim_backend.loads_motion import LoadsAsked
 from sim_backend.mission_motion import GateAsked, MissionAsked
-from sim_backend.stage_motion import DecouplingAsked, SinesFollowed, StepsFollowed
+from sim_backend.stage_motion import DecouplingAsked, SinesFollowed, StaticsAsked, StepsFollowed
 
 Numbers = Mapping[str, float]
 Complex = npt.NDArray[np.complex128]
@@ -223,6 +223,7 @@ class Motions:
         runout: what turns with the shaft, vectors by quantity, plane and place along, m.
         loads: compliance, friction, scale of the force and answers to loads, by quantity and where.
         inductances: constants of a map of inductances, as encoders read places, by quantity and where.
+        statics: force and torque of phases by load cells, and beside another map, by quantity and where.
         stators: where phases draw the shaft, by quantity and where.
         decoupling: of an axis that is held, its largest `excursion` and the moved one's `swing`, effective value `cross`,
             `peak` and `slope` of what crosses over.
@@ -253,6 +254,7 @@ class Motions:
     cogging: Callable[[RigFile, Any, float, float], Mapping[tuple[str, str], float]] | None = None
     loads: Callable[[RigFile, Any, LoadsAsked], Mapping[tuple[str, str], float]] | None = None
     inductances: Callable[[RigFile, Any], Mapping[tuple[str, str], float]] | None = None
+    statics: Callable[[RigFile, Any, StaticsAsked], Mapping[tuple[str, str], float]] | None = None
     stators: Callable[[RigFile, Any], Mapping[tuple[str, str], float]] | None = None
     following: Callable[[RigFile, Any, StepsFollowed | SinesFollowed], Mapping[tuple[str, str], float]] | None = None
     runout: Callable[[RigFile, Any, Sequence[float]], Mapping[tuple[str, str, float], complex]] | None = None

@@ -58,3 +58,16 @@ class DecouplingAsked:
     periods: int
     sliding: float
     smooth_hz: float
+
+
+@dataclass(frozen=True)
+class StaticsAsked:
+    """Loads of single phases on cells that hold a shaft: where encoders read `x` m and `angle` rad, the `phase` (a number) and
+    its true `current` A, each (n,); the `greatest` current. `beside`: the other map's force N and torque N m of each; none."""
+
+    x: Sequence[float]
+    angle: Sequence[float]
+    phase: Sequence[int]
+    current: Sequence[float]
+    greatest: float
+    beside: tuple[Sequence[float], Sequence[float]] | None

@@ -27,8 +27,8 @@ OF = {
     "amb1dof": ("derivative", "estimator-compare"),
     "lira": ("loop-response", "unstable-pole", "pull-ratio", "mission", "gate-margin", "actuator-constant", "cogging-map",
              "runout-map", "bearing-constant", "current-step", "encoder-zero", "sensor-delay", "emf-constant", "coil-map"),
-    "rlsrm": ("map-zero", "inductance-map", "load-response", "positioning", "step-following", "sine-following", "axis-friction",
-              "axis-inertia", "decoupling"),
+    "rlsrm": ("map-zero", "inductance-map", "static-characteristics", "load-response", "positioning", "step-following",
+              "sine-following", "axis-friction", "axis-breakaway", "axis-inertia", "decoupling"),
 }  # fmt: skip
 PAIRS = [(rig, name) for rig, names in OF.items() for name in names]
 TABLES = ("channels", "sensors", "parameters", "geometry", "machine")

@@ -88,6 +88,8 @@ TRUTHS: Mapping[str, Callable[[Any], Found]] = {
     "positioning": positioned.figures,
     "map-zero": reluctance.zeros,
     "inductance-map": reluctance.inductances,
+    "static-characteristics": reluctance.statics,
     "axis-friction": friction.of_axes,
+    "axis-breakaway": friction.breakaway,
     "axis-inertia": friction.inertia,
 }

@@ -9,8 +9,8 @@ from bench.rigfile import RigFile
 from bench.rigfile.capabilities import is_bound as can
 from bench.rigfile.roles import is_bound, resolved
 
-TURNERS = frozenset(("drive", "rotation"))
-"""Roles of what turns a shaft."""
+TURNERS = frozenset(("drive", "rotation", "motion"))
+"""Roles of what turns a shaft; a stage may turn by itself, and lacks a drive for what asks for one."""
 
 
 @dataclass(frozen=True)

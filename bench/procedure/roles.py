@@ -123,6 +123,12 @@ class Operator(Protocol):
     def read(
         self, axis: str, instrument: str, unit: str
     ) -> float: ...  # what an instrument shows now, SI; its usual unit
+    def read_cell(
+        self, axis: str, instrument: str, unit: str
+    ) -> float: ...  # likewise, what a load cell of an axis shows
+    def wind(
+        self, side: Literal["above", "below"]
+    ) -> None: ...  # the load cells that hold the shaft, past their place on that side and back to it
     def ask(self, question: str) -> bool: ...  # yes or no
     def goes_on(self, wrong: str) -> bool: ...  # whether a run goes on that shows this; where nobody is, it does not
 

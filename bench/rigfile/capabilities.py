@@ -12,6 +12,7 @@ from typing import Any, Literal
 from pydantic import Field, model_validator
 
 from bench.rigfile.bit import Bit
+from bench.rigfile.capabilities_of_cells import LoadCell
 from bench.rigfile.capabilities_of_coils import CoilMap
 from bench.rigfile.capabilities_of_loops import CurrentStep, ForceCurrent, Hold, LoopInjection, Motion
 from bench.rigfile.capabilities_of_power import DcLink
@@ -166,6 +167,7 @@ class Capabilities(Part):
     coil_map: CoilMap | None = None
     dc_link: DcLink | None = None
     reference: Mapping[Name, ReferenceInstrument] = {}
+    load_cells: Mapping[Name, LoadCell] = {}
     positioning: Positioning | None = None
     phase_test: PhaseTest | None = None
     model: Mapping[Name, str] = {}

@@ -14,6 +14,7 @@ from bench.rigfile.check_current_steps import problems_of as problems_of_current
 from bench.rigfile.check_dc_link import problems_of as problems_of_dc_link
 from bench.rigfile.check_force_currents import problems_of as problems_of_force_currents
 from bench.rigfile.check_hold import problems_of as problems_of_hold
+from bench.rigfile.check_load_cells import problems_of as problems_of_cells
 from bench.rigfile.check_reference import problems_of as problems_of_reference
 from bench.rigfile.check_stages import problems_of as problems_of_stages
 from bench.rigfile.model import RigFile
@@ -41,6 +42,7 @@ def problems_of(rig: RigFile) -> Iterator[Problem]:
         *problems_of_coil_map(rig),
         *problems_of_dc_link(rig),
         *problems_of_reference(rig),
+        *problems_of_cells(rig),
         *problems_of_stages(rig),
     ):
         yield Problem(rig.path, f"capabilities.{key}", found, expected)

@@ -103,9 +103,10 @@ def _stated(tree: Any, path: tuple[str, ...]) -> Iterator[tuple[str, str, Tolera
 
 
 def references_in(rig: RigFile) -> set[str]:
-    """Identities of the numbers that the machine's tables refer to."""
+    """Identities of the numbers that the machine's tables, and what holds its shaft, refer to."""
     found = (stated for table in TABLES for _, _, stated in _stated(getattr(rig, table), (table,)))
-    return {text.removeprefix("-").strip() for text in found if isinstance(text, str)} | {*rig.spans}
+    arms = {cell.arm for cell in rig.capabilities.load_cells.values() if cell.arm}
+    return {text.removeprefix("-").strip() for text in found if isinstance(text, str)} | {*rig.spans} | arms
 
 
 def _channels(rig: RigFile) -> Iterator[Found]:

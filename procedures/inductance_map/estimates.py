@@ -13,9 +13,10 @@ from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
 from procedures.inductance_map import fit
 from procedures.inductance_map.fit import Found, Known
-from procedures.inductance_map.model import MAP, PHASES, Array, Rows, Terms
+from procedures.inductance_map.model import MAP, PHASES, Rows, Terms
 from procedures.inductance_map.steps import Taken, rows
 from procedures.shared.certificates import certified_gain
+from procedures.shared.joint import parts
 from procedures.stages.map_model import present
 from procedures.stages.stators import Phase, axis, phases
 
@@ -134,27 +135,12 @@ def _terms(found: Found, known: Sequence[Known], of: Rows) -> list[Estimate]:
             continue
         influence = Influence(one.identity, one.identity.replace("/", " "), one.u, "1", "B", "rectangular")
         out = [e + Estimate(0.0, "", {influence: float(s)}) for e, s in zip(out, found.gains[:count, j], strict=True)]
-    for covariance, identity, name, kind, dof in (
-        (found.scatter[:count, :count], "scatter/pulses", "scatter of the pulses", "A", _freedom(of)),
-        (rounding, "counts/encoders", "counts of the encoders", "B", math.inf),
-    ):
-        out = [e + p for e, p in zip(out, _parts(covariance, identity, name, kind, dof), strict=True)]
-    return out
+    scatter = parts(found.scatter[:count, :count], "scatter/pulses", "scatter of the pulses", "A", _freedom(of))
+    counted = parts(rounding, "counts/encoders", "counts of the encoders", "B", math.inf)
+    return [e + s + c for e, s, c in zip(out, scatter, counted, strict=True)]
 
 
 def _freedom(of: Rows) -> float:
     """Pulses less terms that have no certificate."""
     pulses = len(np.unique(of.place * PHASES + of.phase))
     return float(max(pulses - len(MAP) - 3 * PHASES, 1))
-
-
-def _parts(covariance: Array, identity: str, name: str, kind: str, dof: float) -> list[Estimate]:
-    """Estimates of zero with this covariance, by as many independent influences as terms."""
-    u = np.sqrt(np.diag(covariance))
-    scale = np.where(u > 0, u, 1.0)
-    root = np.linalg.cholesky(covariance / np.outer(scale, scale) + 1e-10 * np.eye(len(u)))
-    one = [
-        Influence(f"{identity}/{k + 1}", name, 1.0, "1", "A" if kind == "A" else "B", "normal", dof)
-        for k in range(len(u))
-    ]
-    return [Estimate(0.0, "", {one[k]: float(root[row, k] * u[row]) for k in range(row + 1)}) for row in range(len(u))]

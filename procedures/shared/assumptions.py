@@ -261,6 +261,16 @@ INDUCTANCE_MAP = (
     "Time is the controller's: a clock that is fast by 1e-4 makes fluxes smaller by that share.",
     "An encoder along that is off within its travel by more than its pitch: 1 µm at one place is 0.007 % of the overlap.",
 )
+STATIC_CHARACTERISTICS = (
+    "A gain that both load cells have alike, or one of a cell and its arm that make up for each other: force and torque "
+    "by that share. "
+    "Only the map by flux stands against it.",
+    "Currents' readings that are all wrong by a share change force and torque of a current by twice that share.",
+    "Friction that is not alike from above and from below: half of the difference is taken for load, unless it is there "
+    "without "
+    "currents, too.",
+    "An arm that is not at right angles to the cell: its cosine, 0.015 % for a degree.",
+)
 MAP_ZERO = (
     "Friction that differs by the way the shaft turns: a tenth more one way moves the zero by a tenth of the band.",
     "Inductance that grows to one side over the width of a tooth: the shaft comes to rest where it is greatest, and that is "
@@ -280,6 +290,12 @@ AXIS_FRICTION = (
     "A map of the controller whose error grows with the force by more than saturation: what a newton is under the load is "
     "taken for what it is without.",
     "Time is the controller's: a clock that is fast by 1e-4 makes viscous friction greater by that share.",
+)
+AXIS_BREAKAWAY = (
+    "A weight that is not what its label says, or pulls the wrong way by both its pulleys: breakaway by its share.",
+    "How long an axis has stood: friction that grows with rest is that of the plan's rest.",
+    "Friction that is not alike everywhere: results are means over the places of the ramps.",
+    "A shaft that creeps by less than a count before it breaks away.",
 )
 AXIS_INERTIA = (
     "A part that is not what its certificate says, or turns about another axis than the shaft: results by its share.",

@@ -36,3 +36,14 @@ def inertia(done: Simulated) -> Found:
 
     for axis in chosen(done.recording.rig, done.recording.plan):
         yield named(axis), axis.name, done.truth["J" if axis.unit == "rad" else "m"]
+
+
+def breakaway(done: Simulated) -> Found:
+    """The machine's own Coulomb friction, and one along the path."""
+    from procedures.axis_breakaway.estimates import named
+    from procedures.axis_breakaway.sequence import chosen
+
+    plan = done.recording.plan
+    for axis in chosen(done.recording.rig, plan):
+        yield named(axis), axis.name, done.truth["T_c" if axis.unit == "rad" else "F_c"]
+    yield from (("path_share", f"helix {share:g}", 1.0) for share in plan.helix)

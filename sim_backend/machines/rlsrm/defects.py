@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from sim_backend import instrument
+from sim_backend import instrument, load_cells
 from sim_backend.machines.rlsrm.device import SETTABLE
 from sim_backend.machines.rlsrm.params import PHASES
 
@@ -17,7 +17,8 @@ DEFECTS: Final = {
     "cold_told": 0.0, "brake_x": 0.0, "brake_angle": 0.0, "along_path": 1.0, "lock_loose": 1.0,
     "hook_exchanged": 0.0, "lever_exchanged": 0.0, "hanger_off_at_zero": 0.0,
     "mass_error_M1": 0.0, "mass_error_M2": 0.0, "mass_error_M3": 0.0, "mass_error_M4": 0.0,
-    **instrument.DEFECTS, **{f"current_factor_{name}": 1.0 for name in NAMES}, **{f"told_factor_{name}": 1.0 for name in NAMES},
+    **instrument.DEFECTS, **load_cells.DEFECTS,
+    **{f"current_factor_{name}": 1.0 for name in NAMES}, **{f"told_factor_{name}": 1.0 for name in NAMES},
     **{f"voltage_share_{name}": 1.0 for name in NAMES}, **{f"factor_{name}": 1.0 for name in FACTORS},
 }  # fmt: skip
 """Planted defects and their harmless values. `exchange_phases`: b and c of stator 1 or 2, or of both (3), exchanged at the

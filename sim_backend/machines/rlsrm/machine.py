@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from bench.rigfile import RigFile
 from bench.rigfile.toleranced import Toleranced
-from sim_backend import instrument
+from sim_backend import instrument, load_cells
 from sim_backend.machine import Array, Machine, Numbers, Truth
 from sim_backend.machines.rlsrm import quantities as of
 from sim_backend.machines.rlsrm.defects import DEFECTS, NAMES
@@ -21,6 +21,7 @@ from sim_backend.machines.rlsrm.truth_decoupling import decoupling
 from sim_backend.machines.rlsrm.truth_following import following
 from sim_backend.machines.rlsrm.truth_load import loads
 from sim_backend.machines.rlsrm.truth_map import of_map, of_zeros
+from sim_backend.machines.rlsrm.truth_static import statics
 from sim_backend.motion import Motions
 
 EACH: Final = {"phase_gain": NAMES, "resistance_spread": NAMES, "stator_zero": ("1", "2")}
@@ -42,7 +43,7 @@ def stated(rig: RigFile) -> dict[str, Toleranced]:
     out |= {"site.gravity": rig.site.gravity, "site.air_density": rig.site.air_density}
     for name, sensor in rig.sensors.items():
         out |= {f"{name}.gain": sensor.gain, f"{name}.offset": sensor.offset}
-    out |= dict(_inline(rig)) | instrument.stated(rig)
+    out |= dict(_inline(rig)) | instrument.stated(rig) | load_cells.stated(rig)
     for name, t in rig.simulation.items():
         if isinstance(t, Toleranced):
             out |= {f"{name}_{end}": t for end in EACH[name]} if name in EACH else {name: t}
@@ -187,5 +188,6 @@ RLSRM = Machine(
     radial=slice(0, 0), integral_gains=frozenset(("ki_x", "ki_angle")), turns=False, channels=CHANNELS, places=places,
     spoil=spoil, supply_V=90.0, windings={}, copper_W=copper_W, operator=operator, traced=lambda _: READINGS, daily=DAILY,
     controls=SETTABLE, levitates=False, tick_s=1 / TICKS_S, period_s=LOOP_TICKS / TICKS_S, states=states,
-    motions=Motions(loads=loads, inductances=of_map, stators=of_zeros, following=following, decoupling=decoupling),
+    motions=Motions(loads=loads, inductances=of_map, stators=of_zeros, statics=statics, following=following,
+    decoupling=decoupling),
 )  # fmt: skip

@@ -8,15 +8,19 @@ from typing import Final
 
 from bench.rigfile import RigFile
 from sim_backend.instrument import Instruments
+from sim_backend.load_cells import Cells
 from sim_backend.machine import Truth, weight_in_air
 from sim_backend.machines.rlsrm.device import StagePlant
 from sim_backend.machines.rlsrm.plant import AXES, TICKS_S
 
 HAND_OVER_S: Final = 0.3  # how long it takes to let a mass go
 WORK_S: Final = 1.0
+STILL_S: Final = 0.1
 NONE: Final = (0.0, 0.0)
 LOCKS: Final = {"lock": (True, True), "lock-along": (True, False), "lock-around": (False, True)}
 PARTS: Final = ("ring", "bar")
+DAMPED: Final = 0.1  # share of the critical damping that load cells have
+SIDES: Final = {"above": 1, "below": -1}
 GRAVITY: Final = "site.gravity"
 
 
@@ -34,23 +38,34 @@ class Attendant:
         self._hung: dict[str, str] = {}  # labels by hook or side
         places = {name: lambda k=k: float(plant.core.place[k]) for k, name in enumerate(AXES)}
         self._instruments = Instruments(rig, truth, places, lambda: plant.core.tick / TICKS_S)
+        loads = {name: lambda k=k: plant.core.carried[k] for k, name in enumerate(AXES)}
+        self._cells = Cells(rig, truth, loads, lambda: plant.core.tick / TICKS_S)
+        self._carries = all(axis in rig.capabilities.load_cells for axis in AXES)
 
     def request(self, line: str) -> str:
         """One line: `hang HOOK M1`, `hang HOOK -`, `lever left M1`, `lever left -`, `mount ring`, `mount bar`, `mount lock`
-        (both axes), `mount lock-along`, `mount lock-around`, `mount -` (all of these off), `read AXIS`, `ask TEXT`. Answers
+        (both axes), `mount lock-along`, `mount lock-around`, `mount cells` (load cells in their place), `mount -` (all of these
+        off), `wind above`, `wind below`, `read AXIS`, `cell AXIS`, `ask TEXT`. Answers
         `ok SECONDS` (when it will be done), `ok SECONDS NUMBER UNIT`, `yes` or `error TEXT`."""
         match line.split():
             case ["ask", *_]:
                 return "yes"
             case ["read", axis]:
                 return self._instruments.request(axis)
+            case ["cell", axis]:
+                return self._cells.request(axis)
+            case ["wind", side] if side in SIDES and self._plant.core.carries:
+                return f"ok {self._plant.core.wind(SIDES[side]) + STILL_S}"
             case ["hang", hook, label] if hook in self._ends and self._knows(label):
                 return self._hang(hook, label)
             case ["lever", "left" | "right" as side, label] if self._knows(label):
                 return self._hang(side, label)
             case ["mount", "-"]:
                 self._plant.core.clamp(False, False)
+                self._plant.core.carry(NONE, NONE)
                 self._mount("")
+            case ["mount", "cells"] if self._carries:
+                self._carry()
             case ["mount", part] if part in PARTS:
                 self._mount(part)
             case ["mount", lock] if lock in LOCKS:
@@ -70,6 +85,11 @@ class Attendant:
         }
         mass, inertia = (v[name] for name in more[part]) if part else NONE
         self._plant.core.weigh(p.mass + mass, p.inertia + inertia)
+
+    def _carry(self) -> None:
+        p, stiffness = self._plant.built.plant, [1 / self._cells.gives(axis) for axis in AXES]
+        critical = [2 * math.sqrt(k * j) for k, j in zip(stiffness, (p.mass, p.inertia), strict=True)]
+        self._plant.core.carry((stiffness[0], stiffness[1]), (DAMPED * critical[0], DAMPED * critical[1]))
 
     def _hang(self, where: str, label: str) -> str:
         self._hung.pop(where, None)

@@ -58,6 +58,10 @@ class PlantParams:
     push: Pair = (0.0, 0.0)  # N, N m from outside, along +x and +angle
     tilt: float = 0.0  # rad, +x downwards
     lock_give: Pair = (0.0, 0.0)  # m/N, rad/(N m): of what clamps
+    cell_stiffness: Pair = (0.0, 0.0)  # N/m, N m/rad of load cells that hold it; 0: none do
+    cell_damping: Pair = (0.0, 0.0)  # N s/m, N m s/rad
+    cell_past: Pair = (1e-5, 1.2e-3)  # m, rad: how far they are wound past their place; stand-ins, as what follows
+    cell_rate: Pair = (3.3e-5, 4e-3)  # m/s, rad/s
     hung: Pair = (0.0, 0.0)  # N, N m of weights, along +x and +angle
     hung_rate: Pair = (0.0, 0.0)  # N/s, N m/s by which they are let go
     added: Pair = (0.0, 0.0)  # kg, kg m2 of what hangs

@@ -22,6 +22,8 @@ typedef struct {
     double mass, inertia, viscous[2], coulomb, coulomb_angle, bearing_radius, along_path, coulomb_sides;
     double brake[2], locked[2], push[2], tilt, gravity; /* N, N m; 1: clamped; what acts from outside, along the axes; rad */
     double lock_give[2];              /* m/N, rad/(N m): of what clamps */
+    double cell_stiffness[2], cell_damping[2]; /* N/m, N m/rad of load cells that hold it; 0: none do. N s/m, N m s/rad */
+    double cell_past[2], cell_rate[2];         /* m, rad by which they are wound past their place; m/s, rad/s */
     double hung[2], hung_rate[2], added[2]; /* N, N m that are let go at N/s, N m/s; kg, kg m^2 that hang */
     double stop, stop_stiffness, stop_damping;
     double resistance[6], ambient, copper, thermal_resistance, thermal_capacity; /* ohm at 20 deg; deg C; 1/K; K/W; J/K */
@@ -66,6 +68,8 @@ typedef struct {
     double rate_slow[2], hanging[2], lock_at[2]; /* rates through the loops' filters; N, N m that hang; where it is clamped */
     int32_t lock_shut[2], pulse_phase;
     int64_t pulse_left; /* ticks of a pulse of the whole supply */
+    double cell_at[2], cell_now[2];    /* where the load cells belong, and are */
+    int32_t cell_stage, cell_side;     /* 0 at rest, 1 going past on that side, 2 coming back along, 3 around */
 } rlsrm_state;
 
 void rlsrm_start(const rlsrm_params *, rlsrm_state *);

@@ -46,6 +46,21 @@ static void hand_over(const rlsrm_params *p, rlsrm_state *st) {
     }
 }
 
+/* who winds the load cells takes them past their place on one side and back: along first and around last, for what turns has no
+ * friction along */
+static void wind(const rlsrm_params *p, rlsrm_state *st) {
+    if (st->cell_stage == 0) return;
+    int there = 1;
+    for (int k = 0; k < 2; k++) {
+        int past = st->cell_stage == 1 || (st->cell_stage == 2 && k == ANGLE);
+        double to = st->cell_at[k] + (past ? st->cell_side * p->cell_past[k] : 0), step = p->cell_rate[k] * LOOP_S;
+        double left = to - st->cell_now[k];
+        st->cell_now[k] = fabs(left) <= step ? to : st->cell_now[k] + (left > 0 ? step : -step);
+        there &= st->cell_now[k] == to;
+    }
+    if (there) st->cell_stage = (st->cell_stage + 1) % 4;
+}
+
 /* means over a period, and what copper has warmed by them */
 static void end_period(const rlsrm_params *p, rlsrm_state *st) {
     for (int k = 0; k < PHASES; k++) {
@@ -56,11 +71,15 @@ static void end_period(const rlsrm_params *p, rlsrm_state *st) {
         st->warm[k] += LOOP_S / p->thermal_capacity * (heat - (st->warm[k] - p->ambient) / p->thermal_resistance);
     }
     hand_over(p, st);
+    wind(p, st);
 }
 
 static INLINE void kick(const rlsrm_params *p, const rlsrm_mover *m, rlsrm_state *st) {
     double outer = rlsrm_stop(p, st) + p->push[X] + p->mass * p->gravity * p->tilt;
     double force[2] = {st->force[X] + outer + st->hanging[X], st->force[ANGLE] + p->push[ANGLE] + st->hanging[ANGLE]};
+    for (int k = 0; k < 2; k++)
+        if (p->cell_stiffness[k] > 0)
+            force[k] += p->cell_stiffness[k] * (st->cell_now[k] - st->q[k]) - p->cell_damping[k] * st->v[k];
     rlsrm_kick(p, m, st, force);
 }
 

@@ -64,6 +64,30 @@ class Served(Plant):
         """Clamp axes where they are; the others are free."""
         self._p.locked[0:2] = [float(x), float(angle)]
 
+    def carry(self, stiffness: tuple[float, float], damping: tuple[float, float]) -> None:
+        """Hold it by load cells where it is, N/m and N m/rad, N s/m and N m s/rad; 0: by none."""
+        self._p.cell_stiffness[0:2], self._p.cell_damping[0:2] = list(stiffness), list(damping)
+        self._s.cell_at[0:2] = self._s.cell_now[0:2] = list(self._s.q)
+        self._s.cell_stage = 0
+
+    @property
+    def carries(self) -> bool:
+        """Whether load cells hold it."""
+        return bool(self._p.cell_stiffness[0] > 0)
+
+    def wind(self, side: int) -> float:
+        """Take the load cells past their place on a side and back; how long that takes, s."""
+        self._s.cell_side, self._s.cell_stage = side, 1
+        along, around = (self._p.cell_past[k] / self._p.cell_rate[k] for k in range(2))
+        return float(max(along, around) + along + around)
+
+    @property
+    def carried(self) -> tuple[float, float]:
+        """With what it presses on the load cells that hold it, N and N m, along +x and +angle."""
+        s, p = self._s, self._p
+        each = [p.cell_stiffness[k] * (s.q[k] - s.cell_now[k]) + p.cell_damping[k] * s.v[k] for k in range(2)]
+        return float(each[0]), float(each[1])
+
     def weigh(self, mass: float, inertia: float) -> None:
         """Of the mover, kg and kg m2, with what is mounted on it."""
         self._p.mass, self._p.inertia = mass, inertia

@@ -1,0 +1,137 @@
+"""Breakaway of the axes of a positioned stage, from forces that rise slowly until they move, alone and at once.
+
+Measurands, by axis: the force at which it begins to move, mean of both ways; by helix the force along and around at which both
+give way, as a share of one friction along the path.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from bench.errors import AnalysisError
+from bench.figures import Figure
+from bench.findings import Effect, Finding, Findings
+from bench.procedure import Measured, Procedure, Quantity, read_method
+from bench.procedure.requires import Requires
+from bench.procedure.roles import RigState
+from bench.recording import Recording
+from bench.rigfile import RigFile
+from bench.rigfile.envelope import Envelope
+from bench.rigfile.stage import axes_of
+from procedures.axis_breakaway import checks, estimates
+from procedures.axis_breakaway import figures as drawn
+from procedures.axis_breakaway.estimates import Result
+from procedures.axis_breakaway.moves import acquire
+from procedures.axis_breakaway.plan import Plan
+from procedures.axis_breakaway.sequence import INTEGRATORS, chosen, loads, mass, place, ramp
+from procedures.axis_breakaway.sequence import step_count as counted
+from procedures.axis_breakaway.steps import STATE, read_ramps
+from procedures.shared import assumptions
+
+STICKS = "force at which it begins to move, raised slowly, mean of both ways"
+MEASURES = (
+    Quantity("breakaway", "N", STICKS),
+    Quantity("breakaway_angle", "N m", STICKS, title="breakaway around"),
+    Quantity(
+        "path_share", "1", "both pushed at once: where they give way, of one friction along the path of the surface"
+    ),
+)
+
+
+def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
+    """Breakaway of each axis, and of both."""
+    rig, plan = recording.rig, recording.plan
+    try:
+        ramps = read_ramps(recording)
+        findings.gate(checks.of_ramps(ramps, rig, plan))
+        result = estimates.results(ramps, rig, plan)
+    except AnalysisError as error:
+        findings.end(Finding("ramps-missing", f"{error}.", "", Effect.ERROR))
+    findings.gate(checks.of_result(result, plan))
+    return result
+
+
+def measured(r: Result) -> Iterator[Measured]:
+    """The quantities, kind by kind."""
+    for quantity in MEASURES:
+        for (name, where), estimate in r.estimates.items():
+            if name == quantity.name:
+                yield quantity.measured(estimate, f"helix {where}" if name == estimates.SHARE else where)
+
+
+def figures(r: Result, recording: Recording[Plan]) -> Iterable[Figure]:
+    """The circle and repeats."""
+    del recording
+    return drawn.all_figures(r)
+
+
+def check(rig: RigFile, plan: Plan) -> Iterable[str]:
+    """What cannot work before anything starts."""
+    if unknown := [name for name in plan.axes if name not in axes_of(rig)]:
+        yield f"axes: found {', '.join(unknown)}; the rig positions {', '.join(axes_of(rig)) or 'none'}"
+        return
+    envelope = Envelope(rig)
+    for axis in chosen(rig, plan):
+        if not loads(rig, axis):
+            yield f"{axis.name}: known loads do not pull it both ways; nothing would tell what a newton of the map is"
+        elif mass(axis, plan) not in rig.masses:
+            yield f"{axis.name}: found mass {mass(axis, plan)!r}; expected one of {', '.join(rig.masses)}"
+        rate, span = ramp(axis, plan)
+        for repeat in (0, plan.repeats - 1):
+            for side in (-1, 1):
+                wanted = {axis.target: place(axis, plan, repeat) + side * span / 2, axis.rate: rate}
+                yield from (f"{axis.name}: {problem}" for problem in envelope.problems_of(wanted))
+    if any(share <= 0 for share in plan.helix) or len(set(plan.helix)) < len(plan.helix):
+        yield f"helix: found {', '.join(f'{s:g}' for s in plan.helix)}; expected shares above 0, each once"
+
+
+def requires(rig: RigFile) -> Requires:
+    """By the names that the rig has."""
+    axes = axes_of(rig).values()
+    lacks = [f"capabilities.positioning.axes.{a.name}: found no {part}" for a in axes for part in ("asked", "rate")
+             if not getattr(a, part)]  # fmt: skip
+    lacks += [f"hooks, levers: found none that pull {a.name} both ways" for a in axes if not loads(rig, a)]
+    return Requires(
+        roles=("motion", "operator"),
+        channels=(*(a.channel for a in axes), STATE) if axes else (),
+        capabilities=("positioning", f"settings.{INTEGRATORS}"),
+        masses=True,
+        lacks=tuple(lacks),
+    )
+
+
+def untold(rig: RigFile) -> tuple[Quantity, ...]:
+    """What a rig has no axes for."""
+    units = {a.unit for a in axes_of(rig).values()}
+    missing = [q for q, unit in zip(MEASURES, ("m", "rad"), strict=False) if unit not in units]
+    return (*missing, *(() if {"m", "rad"} <= units else MEASURES[-1:]))
+
+
+def left_out(plan: Plan) -> tuple[Quantity, ...]:
+    """What chosen axes show the rig alone knows."""
+    if plan.axes:
+        return MEASURES
+    return () if plan.helix else MEASURES[-1:]
+
+
+procedure = Procedure(
+    name="axis-breakaway",
+    title="Breakaway of a stage's axes",
+    measures=MEASURES,
+    state=RigState.HELD,
+    plan=Plan,
+    acquire=acquire,
+    evaluate=evaluate,
+    measured=measured,
+    figures=figures,
+    requires=requires,
+    check=check,
+    step_count=lambda plan: 2 * plan.repeats * (6 + 2 * len(plan.helix)),
+    steps_on=counted,
+    untold=untold,
+    left_out=left_out,
+    reached=("scatter/*", "counts/*"),
+    assumes=assumptions.AXIS_BREAKAWAY,
+    method=read_method(__file__),
+    places=("helix",),
+)

@@ -1,0 +1,96 @@
+"""From recorded ramps to the force at which an axis begins to move."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.errors import AnalysisError
+from bench.recording import Recording, Step
+from bench.rigfile.stage import StageAxis, axes_of
+from procedures.axis_breakaway.fit import broke_away, rise
+from procedures.axis_breakaway.moves import HELIX, RAMP
+from procedures.axis_breakaway.plan import Plan
+from procedures.axis_breakaway.sequence import chosen
+from procedures.stages.map_bends import currents, moves
+
+Array = npt.NDArray[np.float64]
+STATE = "state"
+FEWEST = 100  # samples of a ramp
+AT_LIMIT = 0.98  # of the greatest force
+
+
+@dataclass(frozen=True)
+class Ramp:
+    """One: by axis the `force` at the first change of a reading, as the controller gives it, N or N m, and how fast it `rises`
+    there, N/s or N m/s; `moved`: which axis' reading changed first, "" for none; `after` s from the beginning. `moves` as
+    those of passes at constant rates (`axis_friction.steps`)."""
+
+    axis: str
+    share: float
+    repeat: int
+    load: str
+    way: int
+    turned: int
+    moved: str
+    after: float
+    force: Mapping[str, float]
+    rises: Mapping[str, float]
+    moves: Mapping[str, Array]
+    limited: bool
+    states: tuple[str, ...]
+    lost: int
+    expected: int
+
+    @property
+    def where(self) -> str:
+        """As findings name it."""
+        kind = f", helix {self.share:g}" if self.turned else ""
+        under = f", load {self.load}" if self.load else ""
+        return f"{self.axis}{kind}, {'up' if self.way > 0 else 'down'}, repeat {self.repeat + 1}{under}"
+
+
+def read_ramps(recording: Recording[Plan]) -> list[Ramp]:
+    """Every ramp, helices last.
+
+    Raises:
+        AnalysisError: one that was hardly sampled.
+    """
+    return [_ramp(recording, step) for kind in (RAMP, HELIX) for step in recording.steps(kind)]
+
+
+def _ramp(recording: Recording[Plan], step: Step) -> Ramp:
+    rig, labels = recording.rig, step.labels
+    turned = int(labels["turned"])
+    of = {a.name: a for a in chosen(rig, recording.plan)} if turned else {}
+    axis = axes_of(rig)[str(labels["axis"])]
+    watched = of or {axis.name: axis}
+    names = [c for a in axes_of(rig).values() for c in (a.channel, a.asked, a.given) if c] + list(currents(rig))
+    data = step.read(*dict.fromkeys((*names, STATE)))
+    if len(data[STATE]) < FEWEST:
+        raise AnalysisError(f"axis {axis.name}: found {len(data[STATE])} samples of a ramp; expected {FEWEST} or more")
+    t, known = (data["t_ns"] - data["t_ns"][:1]) * 1e-9, rig.choices(STATE)
+    found = {name: broke_away(data[a.channel]) for name, a in watched.items()}
+    first = min((at for at in found.values() if at is not None), default=None)
+    at = len(t) - 1 if first is None else first
+    forces = {name: data[a.given or a.asked] for name, a in watched.items()}
+    inside = {c: data[c][at : at + 1] for c in currents(rig)}
+    return Ramp(
+        axis=axis.name, share=float(labels["share"]), repeat=int(labels["repeat"]), load=str(labels["load"]),
+        way=int(labels["way"]), turned=turned,
+        moved=next((n for n, k in found.items() if first is not None and k == first), ""), after=float(t[at]),
+        force={name: float(f[max(at - 1, 0)]) for name, f in forces.items()},
+        rises={name: rise(t, f, at) for name, f in forces.items()},
+        moves={name: moves(rig, inside, f[at : at + 1])[:, 0] for name, f in forces.items()},
+        limited=any(_limited(recording, a, data, at) for a in watched.values()),
+        states=tuple(known.get(int(code), str(int(code))) for code in np.unique(data[STATE])),
+        lost=step.lost(), expected=step.expected(),
+    )  # fmt: skip
+
+
+def _limited(recording: Recording[Plan], axis: StageAxis, data: Mapping[str, Array], at: int) -> bool:
+    most = recording.rig.parameters[axis.limit].default if axis.limit else np.inf
+    return bool((np.abs(data[axis.asked][: at + 1]) >= AT_LIMIT * most).any())
