@@ -1,0 +1,69 @@
+// How the run ends: STOP, and the outcome with its results.
+
+import { element } from "./told.js";
+import { quantityText, shownIn, withUncertainty } from "./text.js";
+
+const $ = (id) => document.getElementById(id);
+const SAYS = "STOP ends the run and makes the machine safe. It is no emergency stop.";
+const TONES = { PASS: "pass", DONE: "pass", FAIL: "fail", ERROR: "fail", ABORTED: "fail", INDETERMINATE: "open" };
+
+/** The STOP button; `send()` posts. It can be pressed again until the run has taken it. */
+export function stopView(send, changed) {
+  const says = (text, wrong) => {
+    $("stopsays").textContent = text;
+    $("stopsays").classList.toggle("wrong", wrong);
+  };
+  $("stop").addEventListener("click", async () => {
+    says("STOP is being sent …", false);
+    const { ok, status, reply } = await send();
+    if (ok) {
+      $("stop").disabled = true;
+      $("stop").textContent = "STOPPING";
+      says("The run has taken STOP: the machine is made safe, which may take as long as the rotor takes to slow down.", false);
+      changed();
+    } else {
+      const why = status ? `the run refused it (${status})${reply.text ? `: ${reply.text}` : ""}` : "nothing answers";
+      says(`STOP did not get through: ${why}. Press it again, or Ctrl-C at the terminal; in danger the emergency stop.`, true);
+    }
+  });
+  return {
+    allow(may) {
+      $("stop").hidden = !may;
+      $("stop").disabled = false;
+      $("stop").textContent = "STOP";
+      says(may ? SAYS : "This page only watches: the run can be stopped at its terminal.", false);
+    },
+    end() { $("stopbar").hidden = true; },
+    begin() { $("stopbar").hidden = false; },
+  };
+}
+
+function resultRow(result) {
+  const row = element("tr");
+  const { unit, factor, offset } = shownIn(result);
+  const size = (x) => (typeof x === "number" ? x / factor : null);
+  const value = typeof result.value === "number" ? (result.value - offset) / factor : null;
+  const [told, U] = withUncertainty(value, size(result.U));
+  const verdict = (result.verdict || "").toUpperCase();
+  const cells = [["", quantityText(result.name), "Quantity"], ["n", told, "Value"], ["n", U, "± U"], ["", unit, "Unit"],
+    [`verdict ${TONES[verdict] || ""}`, verdict && verdict !== "NONE" ? verdict : "–", "Verdict"]];
+  for (const [kind, text, label] of cells) {
+    const cell = element("td", kind, text);
+    cell.dataset.label = label;
+    row.append(cell);
+  }
+  return row;
+}
+
+export function showEnd(end) {
+  $("ending").hidden = false;
+  $("ending").className = `card ending ${TONES[end.outcome] || "open"}`;
+  $("outcome").textContent = end.outcome;
+  $("reason").textContent = [end.reason, `exit status ${end.status}`].filter(Boolean).join(" · ");
+  $("results").hidden = !end.results?.length;
+  $("results").tBodies[0].replaceChildren(...(end.results || []).map(resultRow));
+  $("report").hidden = !end.report;
+  if (end.report) $("reportlink").setAttribute("href", end.report);
+  $("reportplace").textContent = end.folder ? `It lies in ${end.folder}.` : "";
+  $("ending").focus({ preventScroll: true });
+}
