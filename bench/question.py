@@ -22,17 +22,16 @@ class Choice:
 
 
 class Question(str):
-    """The text as a terminal shows it. `asks` is that text without `hint`, which says what to type; a page has buttons for the
-    `choices` instead, and a field where any text may be an answer (`free`)."""
+    """The text as a terminal shows it. `asks` is that text without the last line, which says what to type there; a page has
+    buttons for the `choices` instead, and, if any text may be an answer, a field with `field` beside it ("": no field)."""
 
     asks: str
-    hint: str
     choices: tuple[Choice, ...]
-    free: bool
+    field: str
 
-    def __new__(cls, asks: str, hint: str = "", choices: Sequence[Choice] = (), free: bool = True) -> Question:
+    def __new__(cls, asks: str, hint: str = "", choices: Sequence[Choice] = (), field: str = "Answer") -> Question:
         made = super().__new__(cls, f"{asks}\n{hint}" if hint else asks)
-        made.asks, made.hint, made.choices, made.free = asks, hint, tuple(choices), free
+        made.asks, made.choices, made.field = asks, tuple(choices), field
         return made
 
 

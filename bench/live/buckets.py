@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import math
+import time
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -53,6 +54,7 @@ class Buckets:
             "fault": self._name(self._view.faults, newest.get("fault")),
             "speed_rpm": _finite(newest.get(self._view.speed, math.nan) * RPM),
             "age_ms": round(age_ms, 1),
+            "sent_ms": time.time_ns() // 1_000_000,
         }
 
     def _channels(self, columns: Mapping[str, Array], starts: npt.NDArray[np.intp]) -> dict[str, Any]:

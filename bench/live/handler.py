@@ -74,7 +74,7 @@ class Handler(BaseHTTPRequestHandler):
         """What the standard library refuses by itself, said as everything else; another method is not allowed."""
         self.close_connection = True
         known = code == 501
-        self._json(405 if known else code, {"error": message or "no such request"})
+        self._refuse(405 if known else code, message or "no such request")
 
     def _lacking(self, path: str, others: tuple[str, ...]) -> None:
         raise Refused(405, "method: not this one here") if path in others else Refused(404, "no such page")
@@ -88,7 +88,7 @@ class Handler(BaseHTTPRequestHandler):
                 gate.check_origin(self.headers, self.host)
                 serve()
             except Refused as refused:
-                self._json(refused.status, {"error": refused.text})
+                self._refuse(refused.status, refused.text)
         except OSError:  # also a timeout: nobody is there
             pass
 
@@ -143,8 +143,8 @@ class Handler(BaseHTTPRequestHandler):
         own = Answer(_line(text), self._by(body))
         first = self.server.site.questions.answer(number, own)
         if first is None:
-            raise Refused(409, "this question is not open any more")
-        self._json(200 if first is own else 409, {"accepted": first is own, "by": first.by})
+            return self._json(409, {"accepted": False, "by": ""})
+        return self._json(200 if first is own else 409, {"accepted": first is own, "by": first.by})
 
     def _stop(self) -> None:
         body = self._body()
@@ -189,6 +189,9 @@ class Handler(BaseHTTPRequestHandler):
         if content:
             self.connection.settimeout(SEND_S)
             self.wfile.write(content)
+
+    def _refuse(self, status: int, text: str) -> None:
+        self._send(status, "text/plain; charset=utf-8", f"{text}\n".encode(), PAGE_POLICY)
 
     def _json(self, status: int, content: Mapping[str, Any]) -> None:
         self._send(status, "application/json", json.dumps(content).encode(), PAGE_POLICY)

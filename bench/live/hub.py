@@ -7,64 +7,66 @@ The run's thread appends to a bounded box (`tell`); the publisher moves what is 
 from __future__ import annotations
 
 import json
+import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
+logger = logging.getLogger("bench.live")
 BOX = 5000  # events that the run may tell between two looks of the publisher; of more the oldest are lost
-KEPT: Mapping[str, int] = {"finding": 500, "log": 200, "answered": 50}
-"""Events of which the last ones stand; of every other kind the newest."""
-FIRST = "hello"
+KEPT: Mapping[str, int] = {"log": 200, "answered": 50}
+"""Events of which the last ones stand; of every other kind the newest, with its key."""
+FIRST, END = "hello", ("end", "")
+Place = tuple[str, str]  # kind and key
+Told = tuple[Place, Mapping[str, Any] | None]
 
 
 class Hub:
     """Of one run. `tell` is for the run's thread, `settle` and `publish` for the publisher's, `follow` for those of clients."""
 
     def __init__(self) -> None:
-        self._told: deque[tuple[str, Mapping[str, Any] | None]] = deque(maxlen=BOX)
+        self._told: deque[Told] = deque(maxlen=BOX)
         self._changed = threading.Condition()
         self._serial = 0
-        self._newest: dict[str, tuple[int, bytes]] = {}
+        self._newest: dict[tuple[str, str], tuple[int, bytes]] = {}
         self._last: dict[str, deque[tuple[int, bytes]]] = {kind: deque(maxlen=n) for kind, n in KEPT.items()}
         self._waiting = self._readers = 0
         self._behind: dict[int, int] = {}  # by reader: how far it has been told
         self.closed = False
 
-    def tell(self, kind: str, data: Mapping[str, Any] | None) -> None:
-        """An event of the run; None: nothing of that kind stands any more. Never waits and never raises."""
-        self._told.append((kind, data))
+    def tell(self, kind: str, data: Mapping[str, Any] | None, key: str = "") -> None:
+        """An event of the run, in the place of one of that kind with the same key; None: nothing stands there any more. Never
+        waits and never raises."""
+        self._told.append(((kind, key), data))
 
     def settle(self) -> None:
         """Move what was told to what stands."""
-        told: list[tuple[str, Mapping[str, Any] | None]] = []
+        told: list[Told] = []
         while self._told:
             told.append(self._told.popleft())
-        newest = {kind: k for k, (kind, _) in enumerate(told) if kind not in KEPT}
-        lasting = [(kind, data) for k, (kind, data) in enumerate(told) if newest.get(kind, k) == k]
-        encoded = [(kind, None if data is None else event_bytes(kind, data)) for kind, data in lasting]
-        if encoded:
-            with self._changed:
-                for kind, event in encoded:
-                    self._stand(kind, event)
-                self._changed.notify_all()
+        newest = {place: k for k, (place, _) in enumerate(told) if place[0] not in KEPT}
+        self._stand([(p, _encoded(p[0], data)) for k, (p, data) in enumerate(told) if newest.get(p, k) == k])
 
-    def publish(self, kind: str, event: bytes) -> None:
-        """An event that is encoded already."""
+    def publish(self, kind: str, data: Mapping[str, Any]) -> None:
+        """An event of the publisher's own."""
+        self._stand([((kind, ""), _encoded(kind, data))])
+
+    def _stand(self, events: Sequence[tuple[Place, bytes | None]]) -> None:
+        if not events:
+            return
         with self._changed:
-            self._stand(kind, event)
+            for place, event in events:
+                self._serial += 1
+                if event is None:
+                    self._newest.pop(place, None)
+                elif place[0] in self._last:
+                    self._last[place[0]].append((self._serial, event))
+                else:
+                    self._newest[place] = (self._serial, event)
             self._changed.notify_all()
-
-    def _stand(self, kind: str, event: bytes | None) -> None:
-        self._serial += 1
-        if event is None:
-            self._newest.pop(kind, None)
-        elif kind in self._last:
-            self._last[kind].append((self._serial, event))
-        else:
-            self._newest[kind] = (self._serial, event)
 
     @property
     def wanted(self) -> bool:
@@ -78,13 +80,13 @@ class Hub:
     @property
     def ended(self) -> bool:
         """Whether the end stands."""
-        return "end" in self._newest
+        return END in self._newest
 
     @property
     def all_told(self) -> bool:
         """Whether every reader has been sent the end, if there is one."""
         with self._changed:
-            end = self._newest.get("end", (0, b""))[0]
+            end = self._newest.get(END, (0, b""))[0]
             return all(place >= end for place in self._behind.values())
 
     @contextmanager
@@ -112,7 +114,7 @@ class Hub:
                     self._changed.wait(left)
             finally:
                 self._waiting -= 1
-            new = [(kind != FIRST, *one) for kind, one in self._newest.items() if one[0] > reader.place]
+            new = [(place[0] != FIRST, *one) for place, one in self._newest.items() if one[0] > reader.place]
             new += [(True, *one) for kept in self._last.values() for one in kept if one[0] > reader.place]
             reader.place = self._serial
         return b"".join(event for _, _, event in sorted(new, key=lambda one: one[:2]))
@@ -135,6 +137,14 @@ class Reader:
         return self._hub.follow(self, seconds)
 
 
-def event_bytes(kind: str, data: Mapping[str, Any]) -> bytes:
-    """One server-sent event (WHATWG HTML, 9.2): JSON has no line break outside of its strings, and none inside."""
-    return f"event: {kind}\ndata: {json.dumps(data, allow_nan=False, separators=(',', ':'))}\n\n".encode()
+def _encoded(kind: str, data: Mapping[str, Any] | None) -> bytes | None:
+    """One server-sent event (WHATWG HTML, 9.2); JSON as it is made here has no line break. Nothing stands of what cannot be
+    said in it."""
+    if data is None:
+        return None
+    try:
+        text = json.dumps(data, allow_nan=False, separators=(",", ":"))
+    except (TypeError, ValueError):
+        logger.debug("an event %s cannot be shown", kind, exc_info=True)
+        return None
+    return f"event: {kind}\ndata: {text}\n\n".encode()

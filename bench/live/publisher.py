@@ -5,11 +5,11 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 from bench.live.buckets import Buckets
-from bench.live.hub import Hub, event_bytes
+from bench.live.hub import Hub
 from bench.recording.tap import Tap
 
 logger = logging.getLogger("bench.live")
@@ -22,28 +22,28 @@ class Publisher:
 
     def __init__(self, hub: Hub) -> None:
         self._hub = hub
-        self._watched: tuple[Tap, Buckets, Callable[[int], float]] | None = None
+        self._watched: tuple[Tap, Buckets, bool] | None = None
         self._end = threading.Event()
 
-    def watch(self, tap: Tap, buckets: Buckets, host_age_ms: Callable[[int], float] = lambda _: 0.0) -> None:
-        """Show the samples of a tap from now on. `host_age_ms` tells of a block's `host_ns` how old its samples were
-        when they came."""
-        self._watched = tap, buckets, host_age_ms
+    def watch(self, tap: Tap, buckets: Buckets, *, real_time: bool) -> None:
+        """Show the samples of a tap from now on. In real time their age counts from when the host heard them, else from when
+        they came into the tap."""
+        self._watched = tap, buckets, real_time
 
     def look(self) -> None:
         """Once: what was told, and the newest samples if a page waits."""
         self._hub.settle()
         if self._watched is None or not self._hub.wanted:
             return
-        tap, buckets, host_age_ms = self._watched
+        tap, buckets, real_time = self._watched
         now = time.monotonic_ns()
         taken = tap.take(now - OLD_NS)
         if taken:
             came_ns, newest = max((blocks[-1] for blocks in taken.values()), key=lambda one: one[0])
-            age_ms = (now - came_ns) * 1e-6 + host_age_ms(newest.host_ns)
+            age_ms = (time.time_ns() - newest.host_ns if real_time else now - came_ns) * 1e-6
             message = buckets.message({name: [b for _, b in blocks] for name, blocks in taken.items()}, age_ms)
             if message is not None:
-                self._hub.publish("samples", event_bytes("samples", message))
+                self._hub.publish("samples", message)
 
     @contextmanager
     def publishing(self) -> Iterator[Publisher]:

@@ -9,6 +9,7 @@ from typing import Any
 from bench.question import Answer, Question
 
 Tell = Callable[[str, Mapping[str, Any] | None], None]
+"""As `bench.live.hub.Hub.tell`."""
 
 
 class Questions:
@@ -26,8 +27,8 @@ class Questions:
         self._number += 1
         opened = self._open = _Open(self._number)
         choices = [{"label": c.label, "answer": c.answer} for c in question.choices]
-        self._tell("prompt", {"id": opened.number, "question": question.asks, "hint": question.hint, "choices": choices,
-                              "free": question.free})  # fmt: skip
+        self._tell("prompt", {"id": opened.number, "question": question.asks, "hint": question.field, "choices": choices,
+                              "free": bool(question.field)})  # fmt: skip
         try:
             yield opened
         finally:

@@ -4,10 +4,12 @@ kept from what it does by itself: no look-up of names, no line on standard error
 from __future__ import annotations
 
 import errno
+import ipaddress
 import logging
 import socket
 import socketserver
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -19,6 +21,7 @@ from bench.live.site import Site
 logger = logging.getLogger("bench.live")
 CLIENTS = 48  # at once
 READERS = 16  # of them, who follow the events
+DRAIN_S = 0.3  # at the end, for what was said last
 
 
 class LiveServer(socketserver.ThreadingMixIn, socketserver.TCPServer):
@@ -47,6 +50,11 @@ class LiveServer(socketserver.ThreadingMixIn, socketserver.TCPServer):
     @property
     def port(self) -> int:
         return int(self.server_address[1])
+
+    @property
+    def local(self) -> bool:
+        """Whether it listens to this computer alone."""
+        return ipaddress.ip_address(str(self.server_address[0])).is_loopback
 
     def process_request(self, request: Any, client_address: Any) -> None:
         """A thread for the client; with too many of them it is turned away without one."""
@@ -78,9 +86,16 @@ class LiveServer(socketserver.ThreadingMixIn, socketserver.TCPServer):
             yield self
         finally:
             self.site.hub.close()
+            self._drained()
             self.shutdown()
             self.server_close()
             thread.join()
+
+    def _drained(self) -> None:
+        """Let pages have what they have not had yet; one that takes nothing is not waited for."""
+        until = time.monotonic() + DRAIN_S
+        while self.site.hub.readers and time.monotonic() < until:
+            time.sleep(0.01)
 
 
 def _resolved(address: str, port: int) -> tuple[socket.AddressFamily, Any]:

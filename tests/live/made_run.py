@@ -61,7 +61,7 @@ class MadeRun:
             "backend": "sim", "served": False, "seed": 0, "visit": 0, "started": "2026-01-01T00:00:00+00:00",
             "simulated": True, "may_stop": True, **self.view.told(),
         })  # fmt: skip
-        self.publisher.watch(self.tap, Buckets(self.view, "controller", 0))
+        self.publisher.watch(self.tap, Buckets(self.view, "controller", 0), real_time=False)
 
     def block(self, n: int = 50) -> None:
         """The next samples of a shaft that turns at 10 Hz."""
@@ -101,7 +101,7 @@ def main(port: int, seconds: float) -> None:
                 run.hub.tell("log", {"text": f"warning: made line {step}"})
             if step % 10 == 5:
                 run.hub.tell("finding", {"code": "samples-lost", "text": f"{step} samples were lost", "where": "link",
-                                         "effect": "note"})  # fmt: skip
+                                         "effect": "note", "id": "samples-lost/link/1"}, "samples-lost/link/1")  # fmt: skip
             time.sleep(0.05)
         with tempfile.TemporaryDirectory() as folder:
             run.site.report = Path(folder, "report.html")
