@@ -1,4 +1,4 @@
-"""Bytes that are no request, or nearly one: the server goes on, nothing is stopped or answered, and the run never hears of it."""
+"""Bytes that are no request, or nearly one: nothing is stopped or answered, and the run never hears of it."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ from made_run import MadeRun
 from bench.live.gate import TOKEN_HEADER, Refused, body_length, check_host, check_origin, check_token, cookie_of
 
 WORDS = [
-    b"GET", b"POST", b"PUT", b" ", b"/", b"/events", b"/stop", b"/answer", b"/report.html", b"HTTP/1.1", b"HTTP/0.9", b"HTTP/9.9",
-    b"\r\n", b"\n", b"\r", b"\0", b":", b"Host: ", b"127.0.0.1", b"Origin: ", b"X-Levbench-Token: ", b"Content-Type: ",
-    b"application/json", b"Content-Length: ", b"4", b"99", b"-1", b"Transfer-Encoding: chunked", b"Cookie: ", b"{}", b'{"id":1}',
-    b"[[[[", b"\xff\xfe", b"%2e%2e/", b"A" * 300, b"Expect: 100-continue", b"Connection: keep-alive", b"\r\n\r\n",
+    b"GET", b"POST", b"PUT", b" ", b"/", b"/events", b"/stop", b"/answer", b"/report.html", b"HTTP/1.1",
+    b"HTTP/0.9", b"HTTP/9.9", b"\r\n", b"\n", b"\r", b"\x00", b":", b"Host: ", b"127.0.0.1", b"Origin: ",
+    b"X-Levbench-Token: ", b"Content-Type: ", b"application/json", b"Content-Length: ", b"4", b"99", b"-1",
+    b"Transfer-Encoding: chunked", b"Cookie: ", b"{}", b'{"id":1}', b"[[[[", b"\xff\xfe", b"%2e%2e/", b"A" * 300,
+    b"Expect: 100-continue", b"Connection: keep-alive", b"\r\n\r\n",
 ]  # fmt: skip
 REQUESTS = st.lists(st.sampled_from(WORDS) | st.binary(max_size=12), max_size=25).map(b"".join)
 
