@@ -163,7 +163,7 @@ class Handler(BaseHTTPRequestHandler):
         body = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
         run = self.server.run
         if self.headers.get("X-Levbench-Token") != TOKEN or run.refuses:
-            self._send(run.refuses or 403, b"refused", "text/plain")
+            self._send(run.refuses or 403, b'{"error": "refused"}', "application/json")
         elif self.path == "/stop":
             run.stops.append(body)
             self._send(202, b"{}", "application/json")
@@ -188,7 +188,7 @@ class Handler(BaseHTTPRequestHandler):
     def _events(self) -> None:
         run = self.server.run
         if self.headers.get("X-Levbench-Token") != TOKEN or run.refuses:
-            self._send(run.refuses or 403, b"the token is another run's", "text/plain")
+            self._send(run.refuses or 403, b'{"error": "the token is missing or another run\'s"}', "application/json")
             return
         self.send_response(200)
         self.send_header("Content-Type", "text/event-stream")

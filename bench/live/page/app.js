@@ -95,7 +95,7 @@ function showLink() {
   const text = run.ended ? "" : texts[run.link];
   if ($("link").textContent !== text) $("link").textContent = text;
   $("link").hidden = !text;
-  document.body.classList.toggle("old", Boolean(stands));
+  document.body.classList.toggle("stale", Boolean(stands));
   $("old").hidden = !stands;
   $("old").textContent = ms === null ? "No data yet." : `No new data for ${ageText(ms)}: the plots stand still.`;
   if (!run.ended) showAge(ms, Boolean(stands));

@@ -22,7 +22,7 @@ export function stopView(send, changed) {
       says("The run has taken STOP: the machine is made safe, which may take as long as the rotor takes to slow down.", false);
       changed();
     } else {
-      const why = status ? `the run refused it (${status})${reply.text ? `: ${reply.text}` : ""}` : "nothing answers";
+      const why = status ? `the run refused it (${status})${reply.error ? `: ${reply.error}` : ""}` : "nothing answers";
       says(`STOP did not get through: ${why}. Press it again, or Ctrl-C at the terminal; in danger the emergency stop.`, true);
     }
   });
@@ -45,11 +45,10 @@ function resultRow(result) {
   const value = typeof result.value === "number" ? (result.value - offset) / factor : null;
   const [told, U] = withUncertainty(value, size(result.U));
   const verdict = (result.verdict || "").toUpperCase();
-  const cells = [["", quantityText(result.name), "Quantity"], ["n", told, "Value"], ["n", U, "± U"], ["", unit, "Unit"],
-    [`verdict ${TONES[verdict] || ""}`, verdict && verdict !== "NONE" ? verdict : "–", "Verdict"]];
-  for (const [kind, text, label] of cells) {
+  const cells = [["", quantityText(result.name)], ["n", told], ["n", U], ["", unit],
+    [`verdict ${TONES[verdict] || ""}`, verdict && verdict !== "NONE" ? verdict : "–"]];
+  for (const [kind, text] of cells) {
     const cell = element("td", kind, text);
-    cell.dataset.label = label;
     row.append(cell);
   }
   return row;

@@ -108,6 +108,20 @@ function limitText({ lower, upper, shown }) {
   return (a === null ? `limit ${b}` : `least ${a}`).replaceAll("-", "−");
 }
 
+/** The limits of all channels of a plot, where they are the same. */
+function commonLimit(panel) {
+  const texts = new Set(panel.channels.map(limitText));
+  return texts.size === 1 ? [...texts][0] : null;
+}
+
+function captionOf(panel) {
+  const caption = document.createElement("figcaption");
+  caption.textContent = panel.unit ? `${panel.heading} / ${panel.unit}` : panel.heading;
+  const limit = commonLimit(panel);
+  if (limit) caption.appendChild(document.createElement("span")).textContent = limit;
+  return caption;
+}
+
 function legendOf(panel) {
   const list = document.createElement("ul");
   list.className = "legend";
@@ -118,7 +132,7 @@ function legendOf(panel) {
     item.append(`${channel.name} `);
     const value = item.appendChild(document.createElement("b"));
     item.append(` ${panel.unit}`);
-    const limit = limitText(channel);
+    const limit = commonLimit(panel) === null && limitText(channel);
     if (limit) item.appendChild(document.createElement("span")).textContent = limit;
     return value;
   });
@@ -129,7 +143,7 @@ function legendOf(panel) {
 export function plotOf(panel, palette) {
   const node = document.createElement("figure");
   node.className = "plot";
-  node.appendChild(document.createElement("figcaption")).textContent = panel.unit ? `${panel.heading} / ${panel.unit}` : panel.heading;
+  node.appendChild(captionOf(panel));
   const frame = node.appendChild(document.createElement("div"));
   frame.className = "frame";
   const { list, values } = legendOf(panel);
@@ -156,7 +170,8 @@ export function plotOf(panel, palette) {
     if (chart.width !== frame.clientWidth && frame.clientWidth > 0) chart.setSize({ width: frame.clientWidth, height: HEIGHT });
     chart.batch(() => {
       chart.setData(data, false);
-      if (view.x.length) chart.setScale("x", { min: end - seconds, max: end });
+      const from = Math.max(0, end - seconds); // a run begins at 0 and fills the picture from its left
+      chart.setScale("x", { min: from, max: from + seconds });
     });
     label();
   };

@@ -46,6 +46,15 @@ export function eventParser(told) {
   };
 }
 
+/** What a text of JSON says; nothing where it is something else. */
+function read(text) {
+  try {
+    return JSON.parse(text) ?? {};
+  } catch {
+    return {};
+  }
+}
+
 /** One reading of /events until it ends. Throws what fetch throws, and {status} where the server refuses. */
 async function readOnce(token, heard, opened) {
   const stopper = new AbortController();
@@ -53,7 +62,7 @@ async function readOnce(token, heard, opened) {
   try {
     const options = { headers: { [HEADER]: token }, cache: "no-store", signal: stopper.signal };
     const reply = await fetch("events", options);
-    if (!reply.ok) throw { status: reply.status, text: (await reply.text()).slice(0, 300) };
+    if (!reply.ok) throw { status: reply.status, text: read(await reply.text()).error };
     opened();
     const push = eventParser(heard);
     const reader = reply.body.pipeThrough(new TextDecoderStream()).getReader();
@@ -79,15 +88,7 @@ export function listen(token, { heard, opened, lost, refused, over }) {
     const timer = setTimeout(done, ms);
     wake = () => { clearTimeout(timer); done(); };
   });
-  const tell = (name, data) => {
-    let read;
-    try {
-      read = JSON.parse(data);
-    } catch {
-      return; // half an event of a server that is going down
-    }
-    heard(name, read);
-  };
+  const tell = (name, data) => heard(name, read(data));
   (async () => {
     while (!over()) {
       let why = "the run closed the connection";
@@ -116,14 +117,7 @@ export async function post(token, path, body) {
       cache: "no-store",
       signal: AbortSignal.timeout(POST_MS),
     });
-    const text = await reply.text();
-    let read = {};
-    try {
-      read = JSON.parse(text);
-    } catch {
-      read = { text };
-    }
-    return { ok: reply.ok, status: reply.status, reply: read };
+    return { ok: reply.ok, status: reply.status, reply: read(await reply.text()) };
   } catch {
     return { ok: false, status: 0, reply: {} };
   }
