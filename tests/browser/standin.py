@@ -100,7 +100,7 @@ def _course(k: int, channel: dict[str, Any], t: np.ndarray) -> np.ndarray:
         case "current":
             return 3.0 + 0.3 * (k % 4) + 0.8 * slow
         case "temperature":
-            return 300.0 + k + 0.1 * slow
+            return 300.0 + 0.1 * slow
         case "speed":
             return SPEED_RAD_S + 0.05 * slow
         case "supply":
@@ -124,6 +124,7 @@ class Run:
     streaming: bool = False
     silent: bool = False  # nothing comes, and the connection stays: a network that hangs
     closed: int = 0  # connections up to this number are to end
+    ending: bool = False
     opened: int = 0
     refuses: int = 0  # status of what is asked, 0: serve
     began: float = field(default_factory=time.monotonic)
@@ -171,7 +172,6 @@ class Handler(BaseHTTPRequestHandler):
             self._send(409, json.dumps({"accepted": False, "by": run.answers[-1]["by"]}).encode(), "application/json")
         else:
             run.answers.append(body)
-            run.told = [t for t in run.told if t[0] != "prompt"]
             self._send(200, json.dumps({"accepted": True, "by": body["by"]}).encode(), "application/json")
             run.tell("answered", body)
 
@@ -199,7 +199,7 @@ class Handler(BaseHTTPRequestHandler):
         run.opened += 1
         mine, sent, t = run.opened, 0, time.monotonic() - run.began
         try:
-            while mine > run.closed:
+            while mine > run.closed and not run.ending:
                 with run.changed:
                     if sent >= len(run.told):
                         run.changed.wait(0.05)
@@ -221,7 +221,7 @@ class Handler(BaseHTTPRequestHandler):
 class Standin(ThreadingHTTPServer):
     """The server on a free port of the loopback; `address` is what a run would print."""
 
-    daemon_threads = True
+    daemon_threads = False  # they are waited for
 
     def __init__(self, port: int = 0) -> None:
         super().__init__(("127.0.0.1", port), Handler)
@@ -233,8 +233,8 @@ class Standin(ThreadingHTTPServer):
         return self
 
     def __exit__(self, *_: Any) -> None:
-        self.run.drop()
         self.shutdown()
+        self.run.ending = True
         self.server_close()
 
 

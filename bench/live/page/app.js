@@ -96,6 +96,7 @@ function showLink() {
   if ($("link").textContent !== text) $("link").textContent = text;
   $("link").hidden = !text;
   document.body.classList.toggle("stale", Boolean(stands));
+  stop.link(!run.hello || run.link === "live");
   $("old").hidden = !stands;
   $("old").textContent = ms === null ? "No data yet." : `No new data for ${ageText(ms)}: the plots stand still.`;
   if (!run.ended) showAge(ms, Boolean(stands));

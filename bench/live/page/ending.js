@@ -4,11 +4,14 @@ import { element } from "./told.js";
 import { quantityText, shownIn, withUncertainty } from "./text.js";
 
 const $ = (id) => document.getElementById(id);
+const UNSURE = "No connection: STOP may not get through. Stop at the terminal; in danger use the emergency stop.";
 const SAYS = "STOP ends the run and makes the machine safe. It is no emergency stop.";
 const TONES = { PASS: "pass", DONE: "pass", FAIL: "fail", ERROR: "fail", ABORTED: "fail", INDETERMINATE: "open" };
 
 /** The STOP button; `send()` posts. It can be pressed again until the run has taken it. */
 export function stopView(send, changed) {
+  let standing = SAYS; // what is said unless the connection is lost
+  let linked = true;
   const says = (text, wrong) => {
     $("stopsays").textContent = text;
     $("stopsays").classList.toggle("wrong", wrong);
@@ -19,7 +22,8 @@ export function stopView(send, changed) {
     if (ok) {
       $("stop").disabled = true;
       $("stop").textContent = "STOPPING";
-      says("The run has taken STOP: the machine is made safe, which may take as long as the rotor takes to slow down.", false);
+      standing = "The run has taken STOP: the machine is made safe, which may take as long as the rotor takes to slow down.";
+      says(standing, false);
       changed();
     } else {
       const why = status ? `the run refused it (${status})${reply.error ? `: ${reply.error}` : ""}` : "nothing answers";
@@ -31,7 +35,13 @@ export function stopView(send, changed) {
       $("stop").hidden = !may;
       $("stop").disabled = false;
       $("stop").textContent = "STOP";
-      says(may ? SAYS : "This page only watches: the run can be stopped at its terminal.", false);
+      standing = may ? SAYS : "This page only watches: the run can be stopped at its terminal.";
+      says(standing, false);
+    },
+    /** Whether there is a connection. */
+    link(is) {
+      if (is !== linked) says(is ? standing : UNSURE, !is);
+      linked = is;
     },
     end() { $("stopbar").hidden = true; },
     begin() { $("stopbar").hidden = false; },
@@ -61,8 +71,9 @@ export function showEnd(end) {
   $("reason").textContent = [end.reason, `exit status ${end.status}`].filter(Boolean).join(" · ");
   $("results").hidden = !end.results?.length;
   $("results").tBodies[0].replaceChildren(...(end.results || []).map(resultRow));
-  $("report").hidden = !end.report;
+  $("report").hidden = !end.report && !end.folder;
+  $("reportlink").hidden = !end.report;
   if (end.report) $("reportlink").setAttribute("href", end.report);
-  $("reportplace").textContent = end.folder ? `It lies in ${end.folder}.` : "";
+  $("reportplace").textContent = end.folder ? `The run lies in ${end.folder}.` : "";
   $("ending").focus({ preventScroll: true });
 }

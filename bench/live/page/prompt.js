@@ -82,7 +82,8 @@ export function promptView(send, changed) {
     answered({ id, answer: text, by }) {
       if (open && open.id !== id) return;
       close();
-      $("answered").textContent = `Answered ${text === "" ? "“done”" : `“${text}”`}${by ? ` by ${by}` : ""}.`;
+      const said = text === "" ? "Answered: done" : `Answered: “${text}”`;
+      $("answered").textContent = typeof text === "string" ? `${said}${by ? ` (${by})` : ""}.` : "The question was taken back.";
       $("answered").hidden = false;
     },
     /** The connection is made anew: if the question still stands it comes again. */

@@ -3,7 +3,7 @@
 import { ageText, clock, fixed } from "./text.js";
 
 const MOST_LINES = 300;
-const LOUD = { error: 0, aborted: 0, indeterminate: 1, note: 2 };
+const LOUD = { error: 0, indeterminate: 1, note: 2 };
 const $ = (id) => document.getElementById(id);
 
 export function element(tag, kind, text) {
@@ -42,7 +42,6 @@ export function showProgress({ stage, step, done, total, left_s }) {
   $("stage").textContent = stage || "Running";
   $("step").textContent = step || "";
   const bar = $("bar");
-  bar.hidden = false;
   if (total) {
     bar.max = total;
     bar.value = Math.min(done, total);
