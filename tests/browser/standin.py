@@ -126,6 +126,7 @@ class Run:
     closed: int = 0  # connections up to this number are to end
     ending: bool = False
     opened: int = 0
+    holds: bool = False  # a request for events waits for its answer
     refuses: int = 0  # status of what is asked, 0: serve
     began: float = field(default_factory=time.monotonic)
 
@@ -190,6 +191,8 @@ class Handler(BaseHTTPRequestHandler):
         if self.headers.get("X-Levbench-Token") != TOKEN or run.refuses:
             self._send(run.refuses or 403, b'{"error": "the token is missing or another run\'s"}', "application/json")
             return
+        while run.holds and not run.ending:
+            time.sleep(0.05)
         self.send_response(200)
         self.send_header("Content-Type", "text/event-stream")
         self.send_header("Cache-Control", "no-store")
@@ -197,7 +200,8 @@ class Handler(BaseHTTPRequestHandler):
         self.end_headers()
         self.close_connection = True
         run.opened += 1
-        mine, sent, t = run.opened, 0, time.monotonic() - run.began
+        mine, sent = run.opened, 0
+        t = 0.0 if mine == 1 else time.monotonic() - run.began  # the first page sees it from its beginning
         try:
             while mine > run.closed and not run.ending:
                 with run.changed:

@@ -86,7 +86,7 @@ function showLink() {
   const since = ms === null ? "" : ` The newest data are ${ageText(ms)} old.`;
   const texts = {
     connecting: "Connecting to the run …",
-    live: run.stopping ? "STOP was taken: the machine is made safe." : "",
+    live: !run.hello ? "Connected. The run has not begun yet." : run.stopping ? "STOP was taken: the machine is made safe." : "",
     lost: `Connection lost: ${run.why}.${since} What is shown may be out of date. Trying again ${seconds ? `in ${seconds} s` : "now"}.`,
     refused: `The run refuses this page: ${run.why || "its token is missing or another run's"}. Open the address that the run printed.`,
   };
