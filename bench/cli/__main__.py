@@ -85,10 +85,14 @@ def run(
     allow_expired: o.AllowExpired = False,
     spec: o.Spec = None,
     require_verdict: o.RequireVerdict = False,
+    live: o.Live = False,
+    live_port: o.LivePort = None,
+    live_bind: o.LiveBind = None,
     verbose: o.Verbose = False,
 ) -> int:
     """Run a procedure on a rig. The last line on standard output is the run directory."""
     from bench.cli.compose import Request
+    from bench.cli.live import asked_page
     from bench.cli.run import run_command
 
     asked = Request(
@@ -97,7 +101,7 @@ def run(
         clear_fault=clear_fault, out=out, operator=operator.value if operator else None, report=not no_report,
         calibrations=calibrations, allow_expired=allow_expired, spec=spec, require_verdict=require_verdict,
     )  # fmt: skip
-    return run_command(asked, verbose)
+    return run_command(asked, verbose, asked_page(live, live_port, live_bind))
 
 
 @app.command()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -36,6 +36,7 @@ from bench.errors import (
     SpeedContradicts,
     StateContradicts,
     StateNotReached,
+    StopAsked,
 )
 from bench.findings import Effect, Finding
 from bench.procedure.roles import RigState
@@ -45,13 +46,13 @@ from bench.record.outcomes import Outcome
 from bench.recording.recorder import Recorder
 from bench.rigfile.registers import RegisterRefused
 from bench.run import provenance
-from bench.run.evaluation import Ending
+from bench.run.evaluation import Ending, of_calibrations
 from bench.run.job import Job, OpenRig
 from bench.run.supervisor import SafeStep, Supervisor
 
 logger = logging.getLogger("bench.run.runner")
 CODES: tuple[tuple[type[BaseException], str], ...] = (
-    (SignalAbort, "signal"), (OperatorAbort, "operator-stop"), (DriveFault, "drive-fault"),
+    (StopAsked, "operator-stop"), (SignalAbort, "signal"), (OperatorAbort, "operator-stop"), (DriveFault, "drive-fault"),
     (DeviceFault, "controller-fault"), (AnotherHost, "another-host"), (NotDischarged, "not-discharged"),
     (InterlockError, "interlock"),
     (RegisterRefused, "device-refused"), (DeviceUnreadable, "device-unreadable"), (NoReply, "no-reply"),
@@ -126,13 +127,15 @@ def _moved(
         try:
             with supervisor.moving():
                 progress.stage(f"bring the rig to {procedure.state}")
+                progress.found(lambda: (*live.findings, *of_calibrations(recorder.calibrations)))
                 transition(rig, RigState.READY)
                 rig.levitation.write(procedure.settings(job.rig, job.plan))
                 transition(rig, procedure.state)
                 up = True
                 progress.stage("acquire")
                 progress.total(procedure.steps(job.rig, job.plan))
-                procedure.acquire(rig, job.plan, cast(Recorder, WatchedSteps(recorder, progress, live.catch_up)))
+                steps = WatchedSteps(recorder, progress, live.catch_up, lambda: rig.health().findings())
+                procedure.acquire(rig, job.plan, cast(Recorder, steps))
         except BaseException as error:
             # Whatever it is, also SystemExit: the machine is made safe first.
             cause = error
@@ -168,11 +171,14 @@ def _recording_or_not(step: SafeStep, live: OpenRig) -> SafeStep:
 
 
 class WatchedSteps:
-    """The recorder as `acquire` sees it, with each step told to the progress display, and over only when telemetry has
-    reached its end: what `acquire` commands next does not act within it."""
+    """The recorder as `acquire` sees it, with each step told to the progress display, and what is wrong with the link by then,
+    and over only when telemetry has reached its end: what `acquire` commands next does not act within it."""
 
-    def __init__(self, recorder: Recorder, progress: Progress, catch_up: Callable[[], None]) -> None:
-        self._recorder, self._progress, self._catch_up = recorder, progress, catch_up
+    def __init__(
+        self, recorder: Recorder, progress: Progress, catch_up: Callable[[], None],
+        troubles: Callable[[], Iterable[Finding]] = tuple,
+    ) -> None:  # fmt: skip
+        self._recorder, self._progress, self._catch_up, self._troubles = recorder, progress, catch_up, troubles
 
     @contextmanager
     def step(self, kind: str, **labels: Any) -> Iterator[None]:
@@ -180,6 +186,7 @@ class WatchedSteps:
         with self._recorder.step(kind, **labels):
             yield
         self._catch_up()
+        self._progress.found(self._troubles)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._recorder, name)

@@ -30,11 +30,15 @@ def channels() -> list[dict[str, Any]]:
 
     def add(name: str, unit: str, kind: str, group: str, upper: float | None = None, lower: float | None = None,
             **shown: Any) -> None:  # fmt: skip
-        found.append({"name": name, "unit": unit, "kind": kind, "group": group, "lower": lower, "upper": upper, **shown})
+        found.append(
+            {"name": name, "unit": unit, "kind": kind, "group": group, "lower": lower, "upper": upper, **shown}
+        )
 
     for place, letter in (("inboard", "i"), ("outboard", "o")):
         for axis in "yx":
-            add(f"pos_{axis}{letter}", "m", "position", place, ENVELOPE_M, -ENVELOPE_M, display_unit="um", factor=MICRON)
+            add(
+                f"pos_{axis}{letter}", "m", "position", place, ENVELOPE_M, -ENVELOPE_M, display_unit="um", factor=MICRON
+            )
         for coil in ("y{}_p", "y{}_n", "x{}_p", "x{}_n"):
             add(f"i_{coil.format(letter)}", "A", "current", place, 12.5)
     add("pos_z", "m", "position", "axial", display_unit="um", factor=MICRON)
@@ -110,7 +114,9 @@ def _course(k: int, channel: dict[str, Any], t: np.ndarray) -> np.ndarray:
 
 
 def _spread(channel: dict[str, Any]) -> float:
-    return {"position": 2e-6, "current": 0.02, "temperature": 0.02, "speed": 0.01, "supply": 0.05}.get(channel["kind"], 1e-4)
+    return {"position": 2e-6, "current": 0.02, "temperature": 0.02, "speed": 0.01, "supply": 0.05}.get(
+        channel["kind"], 1e-4
+    )
 
 
 @dataclass
@@ -242,7 +248,14 @@ class Standin(ThreadingHTTPServer):
         self.server_close()
 
 
-PROGRESS = {"stage": "hanging masses", "step": "M2 1.000 kg, loading", "done": 23, "total": 72, "elapsed_s": 184.0, "left_s": 391.0}
+PROGRESS = {
+    "stage": "hanging masses",
+    "step": "M2 1.000 kg, loading",
+    "done": 23,
+    "total": 72,
+    "elapsed_s": 184.0,
+    "left_s": 391.0,
+}
 PROMPT = {
     "id": 1, "free": True, "hint": "Another mass: its label (M1, M2, M3, M4, - for none); ? for more",
     "question": "The shaft levitates: 130 V are on the coils, hands away from them.\nHang M3 on the hanger.\n"
@@ -256,7 +269,12 @@ FINDINGS = (
     {"code": "load-not-still", "text": "The hanging mass swings: 0.8 N of 5 Hz.", "where": "hang 14", "effect": "indeterminate"},
     {"code": "stuck-channel", "text": "pos_yi has stood on 12.3 µm for 1.0 s while the tick went on.", "where": "pos_yi", "effect": "error"},
 )  # fmt: skip
-LOG = ("links: controller in this process", "supply 148.0 V", "lift: inboard, outboard, axial", "hanging masses: 72 steps")
+LOG = (
+    "links: controller in this process",
+    "supply 148.0 V",
+    "lift: inboard, outboard, axial",
+    "hanging masses: 72 steps",
+)
 RESULTS = [
     {"name": "K@inboard", "value": 75.004, "U": 0.21, "unit": "N/A", "verdict": "pass"},
     {"name": "K@outboard", "value": 74.876, "U": 0.34, "unit": "N/A", "verdict": "pass"},
