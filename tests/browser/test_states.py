@@ -91,8 +91,8 @@ def test_a_state(standin: Standin, opened: Callable[..., Any], state: Callable[[
     assert state in BEFORE_AND_AFTER or page.evaluate(REACHED)
     SHOTS.mkdir(parents=True, exist_ok=True)
     name = f"{state.__name__}-{width}-{'dark' if dark else 'light'}"
-    page.screenshot(path=SHOTS / f"{name}.png")
+    (SHOTS / f"{name}.png").write_bytes(page.screenshot())
     if width == 400:  # all of it, which a phone shows by scrolling
         page.set_viewport_size({"width": width, "height": 2200})
         page.wait_for_timeout(500)
-        page.screenshot(path=SHOTS / f"{name}-all.png")
+        (SHOTS / f"{name}-all.png").write_bytes(page.screenshot())

@@ -1,11 +1,11 @@
 // The live page of a run: what the stream says, handed to the views; how old it is, said at all times.
 
 import { History, float32 } from "./buffers.js";
-import { showEnd, stopView } from "./ending.js";
+import { offerReport, showEnd, showGone, stopView } from "./ending.js";
 import { orbitOf } from "./orbits.js";
 import { picturesView } from "./pictures.js";
 import { keepName, promptView, who } from "./prompt.js";
-import { listen, post, takeToken } from "./stream.js";
+import { listen, post, reportOf, takeToken } from "./stream.js";
 import { findingsView, logView, showAge, showHello, showProgress, showSample } from "./told.js";
 import { ageText } from "./text.js";
 
@@ -63,10 +63,17 @@ const heard = {
     prompt.close();
     stop.end();
     showEnd(end);
+    if (end.report) keepReport(end);
     showLink();
     showTitle();
   },
 };
+
+/** Asks for the report at once: the run stays a while for who did. */
+async function keepReport(end) {
+  const blob = await reportOf(run.token, end.report);
+  if (blob && run.ended === end) offerReport(blob, run.hello?.run_id || "report");
+}
 
 /** Age of the newest sample, ms: when it was sent, the way, and since then; null before the first. */
 function age() {
@@ -113,6 +120,7 @@ function start() {
     opened: () => { run.link = "live"; clockDifference.least = Infinity; showLink(); },
     lost: ({ inMs, why }) => { Object.assign(run, { link: "lost", why, retryAt: Date.now() + inMs }); showLink(); },
     refused: (why) => { Object.assign(run, { link: "refused", why }); showLink(); },
+    gone: () => { if (mine === run.token) showGone(); },
     over: () => run.ended !== null || mine !== run.token,
   });
   return showLink();

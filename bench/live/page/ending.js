@@ -6,6 +6,7 @@ import { quantityText, shownIn, withUncertainty } from "./text.js";
 const $ = (id) => document.getElementById(id);
 const UNSURE = "No connection: STOP may not get through. Stop at the terminal; in danger use the emergency stop.";
 const SAYS = "STOP ends the run and makes the machine safe. It is no emergency stop.";
+const ORDER = ["FAIL", "INDETERMINATE", "PASS"]; // then those that nothing judged
 const TONES = { PASS: "pass", DONE: "pass", FAIL: "fail", ERROR: "fail", ABORTED: "fail", INDETERMINATE: "open" };
 
 /** The STOP button; `send()` posts. It can be pressed again until the run has taken it. */
@@ -48,13 +49,17 @@ export function stopView(send, changed) {
   };
 }
 
+function verdictOf({ verdict }) {
+  return (verdict || "").toUpperCase();
+}
+
 function resultRow(result) {
   const row = element("tr");
   const { unit, factor, offset } = shownIn(result);
   const size = (x) => (typeof x === "number" ? x / factor : null);
   const value = typeof result.value === "number" ? (result.value - offset) / factor : null;
   const [told, U] = withUncertainty(value, size(result.U));
-  const verdict = (result.verdict || "").toUpperCase();
+  const verdict = verdictOf(result);
   const cells = [["", quantityText(result.name)], ["n", told], ["n", U], ["", unit],
     [`verdict ${TONES[verdict] || ""}`, verdict && verdict !== "NONE" ? verdict : "–"]];
   for (const [kind, text] of cells) {
@@ -69,11 +74,30 @@ export function showEnd(end) {
   $("ending").className = `card ending ${TONES[end.outcome] || "open"}`;
   $("outcome").textContent = end.outcome;
   $("reason").textContent = [end.reason, `exit status ${end.status}`].filter(Boolean).join(" · ");
-  $("results").hidden = !end.results?.length;
-  $("results").tBodies[0].replaceChildren(...(end.results || []).map(resultRow));
+  const rank = (result) => ORDER.indexOf(verdictOf(result)) + 1 || ORDER.length;
+  const results = (end.results || []).filter((r) => typeof r.value === "number").sort((a, b) => rank(a) - rank(b));
+  const missing = (end.results || []).filter((r) => typeof r.value !== "number").map((r) => quantityText(r.name));
+  $("results").hidden = !results.length;
+  $("results").tBodies[0].replaceChildren(...results.map(resultRow));
+  $("missing").hidden = !missing.length;
+  $("missing").textContent = results.length ? `Not measured: ${missing.join(", ")}.` : "Nothing was measured.";
   $("report").hidden = !end.report && !end.folder;
   $("reportlink").hidden = !end.report;
+  $("reportsave").hidden = true;
   if (end.report) $("reportlink").setAttribute("href", end.report);
-  $("reportplace").textContent = end.folder ? `The run lies in ${end.folder}.` : "";
+  $("reportplace").textContent = end.folder ? `The run lies in ${end.folder}` : "";
+  if (!$("bar").hasAttribute("value")) $("bar").hidden = true;
   $("ending").focus({ preventScroll: true });
+}
+
+/** The report as a file to keep, which this page holds for as long as it is open. */
+export function offerReport(blob, name) {
+  $("reportsave").href = URL.createObjectURL(blob);
+  $("reportsave").download = `${name}.html`;
+  $("reportsave").hidden = false;
+}
+
+/** The run's server has ended: nothing can be opened there any more. */
+export function showGone() {
+  $("reportlink").hidden = true;
 }

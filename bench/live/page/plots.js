@@ -2,7 +2,7 @@
 /* global uPlot */
 
 import { bandOf } from "./buffers.js";
-import { decimalsOf, fixed, shownIn } from "./text.js";
+import { clock, decimalsOf, fixed, shownIn } from "./text.js";
 
 const MOST_LINES = 4; // in one plot; more are unreadable
 const POINTS = 600;
@@ -85,6 +85,12 @@ function drawLimits(panel, palette) {
   };
 }
 
+/** Ticks of the upright axis with as many decimals as they need. */
+function tickTexts(_, ticks, __, ___, step) {
+  const decimals = Math.max(0, Math.ceil(-Math.log10(step) - 1e-9));
+  return ticks.map((t) => (decimals > 5 ? t.toExponential(1) : fixed(t, decimals)));
+}
+
 function optionsOf(panel, palette, width, hooks) {
   const lines = panel.channels.flatMap((channel, k) => ["high", "low"].map(() => (
     { label: channel.name, width: 1, stroke: () => palette().lines[k], points: { show: false }, spanGaps: false })));
@@ -94,8 +100,8 @@ function optionsOf(panel, palette, width, hooks) {
     cursor: { drag: { x: false, y: false }, points: { show: false }, y: false },
     scales: { x: { time: false }, y: { range: rangeOf(panel) } },
     series: [{}, ...lines],
-    bands: panel.channels.map((_, k) => ({ series: [2 * k + 1, 2 * k + 2], fill: () => `${palette().lines[k]}55` })),
-    axes: [{ ...axis, size: 28, values: (_, ticks) => ticks.map((t) => `${+t.toFixed(2)} s`), space: 70 }, { ...axis, size: 58 }],
+    bands: panel.channels.map((_, k) => ({ series: [2 * k + 1, 2 * k + 2], fill: () => `${palette().lines[k]}3a` })),
+    axes: [{ ...axis, size: 28, values: (_, ticks) => ticks.map((t) => (t < 600 ? `${+t.toFixed(2)} s` : clock(t))), space: 70 }, { ...axis, size: 58, values: tickTexts }],
     hooks,
   };
 }

@@ -79,9 +79,19 @@ async function readOnce(token, heard, opened) {
   }
 }
 
-/** Keeps reading until `over()`; tells `lost({inMs, why})` between two tries and `refused(why)` where no try can help.
+/** The report, which the run keeps serving for a while where it was asked for at once; null where there is none. */
+export async function reportOf(token, path) {
+  try {
+    const reply = await fetch(path, { headers: { [HEADER]: token }, cache: "no-store" });
+    return reply.ok ? await reply.blob() : null;
+  } catch {
+    return null;
+  }
+}
+
+/** Keeps reading until `over()`, then tells `gone()`; tells `lost({inMs, why})` between two tries and `refused(why)` where no try can help.
  * Returns a function that forgets the pause and tries again at once. */
-export function listen(token, { heard, opened, lost, refused, over }) {
+export function listen(token, { heard, opened, lost, refused, over, gone }) {
   let pause = FIRST_MS;
   let wake = () => {};
   const wait = (ms) => new Promise((done) => {
@@ -98,11 +108,12 @@ export function listen(token, { heard, opened, lost, refused, over }) {
         if (error.status === 401 || error.status === 403) return refused(error.text);
         why = error.status ? error.text || `the run answered ${error.status}` : "nothing comes from the run";
       }
-      if (over()) return;
+      if (over()) break;
       lost({ inMs: pause, why });
       await wait(pause);
       pause = Math.min(LONGEST_MS, 2 * pause);
     }
+    return gone();
   })();
   return () => { pause = FIRST_MS; wake(); };
 }
