@@ -37,6 +37,7 @@ const heard = {
     findings.clear();
     log.clear();
     prompt.heardHello();
+    document.body.classList.add("told");
     showHello(hello);
     showTitle();
   },

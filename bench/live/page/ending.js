@@ -5,7 +5,7 @@ import { quantityText, shownIn, withUncertainty } from "./text.js";
 
 const $ = (id) => document.getElementById(id);
 const UNSURE = "No connection: STOP may not get through. Stop at the terminal; in danger use the emergency stop.";
-const SAYS = "STOP ends the run and makes the machine safe. It is no emergency stop.";
+const SAYS = "STOP ends the run and makes the machine safe.";
 const ORDER = ["FAIL", "INDETERMINATE", "PASS"]; // then those that nothing judged
 const TONES = { PASS: "pass", DONE: "pass", FAIL: "fail", ERROR: "fail", ABORTED: "fail", INDETERMINATE: "open" };
 
@@ -14,7 +14,7 @@ export function stopView(send, changed) {
   let standing = SAYS; // what is said unless the connection is lost
   let linked = true;
   const says = (text, wrong) => {
-    $("stopsays").textContent = text;
+    $("stoptext").textContent = text;
     $("stopsays").classList.toggle("wrong", wrong);
   };
   $("stop").addEventListener("click", async () => {
@@ -33,7 +33,7 @@ export function stopView(send, changed) {
   });
   return {
     allow(may) {
-      $("stop").hidden = !may;
+      $("stop").hidden = $("noemergency").hidden = !may;
       $("stop").disabled = false;
       $("stop").textContent = "STOP";
       standing = may ? SAYS : "This page only watches: the run can be stopped at its terminal.";
