@@ -12,6 +12,7 @@ from datetime import UTC, datetime
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from bench import display_units
 from bench.errors import Aborted, BenchError, ConfigError
 from bench.findings import SIMULATED_CONTROLLER
 from bench.os_signals import delivered_to
@@ -163,7 +164,9 @@ def _result(m: Measurement) -> dict[str, Any]:
     if half is None and m.interval is not None:
         half = (m.interval[1] - m.interval[0]) / 2
     name = f"{m.name}@{m.where}" if m.where else m.name
-    return {"name": name, "value": m.value, "U": half, "unit": m.unit, "verdict": m.verdict.value}
+    symbol, factor = display_units.of_result(m.unit, m.value or half or 0.0)
+    return {"name": name, "value": m.value, "U": half, "unit": m.unit, "display_unit": symbol, "factor": factor,
+            "verdict": m.verdict.value}  # fmt: skip
 
 
 @contextmanager

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from bench import display_units
 from bench.errors import BenchError
 from bench.rigfile import RigFile, protection
 from bench.rigfile.places import PlaceError, Places
@@ -38,8 +39,10 @@ class Shown:
     stream: str
 
     def told(self) -> dict[str, Any]:
+        size = max((abs(limit) for limit in (self.lower, self.upper) if limit is not None), default=0.0)
+        symbol, factor, offset = display_units.of_channel(self.unit, size)
         return {"name": self.name, "unit": self.unit, "kind": self.kind, "group": self.group, "lower": self.lower,
-                "upper": self.upper}  # fmt: skip
+                "upper": self.upper, "display_unit": symbol, "factor": factor, "offset": offset}  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -104,7 +104,7 @@ def _course(k: int, channel: dict[str, Any], t: np.ndarray) -> np.ndarray:
         case "current":
             return 3.0 + 0.3 * (k % 4) + 0.8 * slow
         case "temperature":
-            return 300.0 + k + 0.1 * slow
+            return 300.0 + 0.1 * slow
         case "speed":
             return SPEED_RAD_S + 0.05 * slow
         case "supply":
@@ -130,7 +130,9 @@ class Run:
     streaming: bool = False
     silent: bool = False  # nothing comes, and the connection stays: a network that hangs
     closed: int = 0  # connections up to this number are to end
+    ending: bool = False
     opened: int = 0
+    holds: bool = False  # a request for events waits for its answer
     refuses: int = 0  # status of what is asked, 0: serve
     began: float = field(default_factory=time.monotonic)
 
@@ -169,7 +171,7 @@ class Handler(BaseHTTPRequestHandler):
         body = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
         run = self.server.run
         if self.headers.get("X-Levbench-Token") != TOKEN or run.refuses:
-            self._send(run.refuses or 403, b"refused", "text/plain")
+            self._send(run.refuses or 403, b'{"error": "refused"}', "application/json")
         elif self.path == "/stop":
             run.stops.append(body)
             self._send(202, b"{}", "application/json")
@@ -177,7 +179,6 @@ class Handler(BaseHTTPRequestHandler):
             self._send(409, json.dumps({"accepted": False, "by": run.answers[-1]["by"]}).encode(), "application/json")
         else:
             run.answers.append(body)
-            run.told = [t for t in run.told if t[0] != "prompt"]
             self._send(200, json.dumps({"accepted": True, "by": body["by"]}).encode(), "application/json")
             run.tell("answered", body)
 
@@ -194,8 +195,10 @@ class Handler(BaseHTTPRequestHandler):
     def _events(self) -> None:
         run = self.server.run
         if self.headers.get("X-Levbench-Token") != TOKEN or run.refuses:
-            self._send(run.refuses or 403, b"the token is another run's", "text/plain")
+            self._send(run.refuses or 403, b'{"error": "the token is missing or another run\'s"}', "application/json")
             return
+        while run.holds and not run.ending:
+            time.sleep(0.05)
         self.send_response(200)
         self.send_header("Content-Type", "text/event-stream")
         self.send_header("Cache-Control", "no-store")
@@ -203,9 +206,10 @@ class Handler(BaseHTTPRequestHandler):
         self.end_headers()
         self.close_connection = True
         run.opened += 1
-        mine, sent, t = run.opened, 0, time.monotonic() - run.began
+        mine, sent = run.opened, 0
+        t = 0.0 if mine == 1 else time.monotonic() - run.began  # the first page sees it from its beginning
         try:
-            while mine > run.closed:
+            while mine > run.closed and not run.ending:
                 with run.changed:
                     if sent >= len(run.told):
                         run.changed.wait(0.05)
@@ -227,7 +231,7 @@ class Handler(BaseHTTPRequestHandler):
 class Standin(ThreadingHTTPServer):
     """The server on a free port of the loopback; `address` is what a run would print."""
 
-    daemon_threads = True
+    daemon_threads = False  # they are waited for
 
     def __init__(self, port: int = 0) -> None:
         super().__init__(("127.0.0.1", port), Handler)
@@ -239,8 +243,8 @@ class Standin(ThreadingHTTPServer):
         return self
 
     def __exit__(self, *_: Any) -> None:
-        self.run.drop()
         self.shutdown()
+        self.run.ending = True
         self.server_close()
 
 

@@ -1,11 +1,11 @@
 // The live page of a run: what the stream says, handed to the views; how old it is, said at all times.
 
 import { History, float32 } from "./buffers.js";
-import { showEnd, stopView } from "./ending.js";
+import { offerReport, showEnd, showGone, stopView } from "./ending.js";
 import { orbitOf } from "./orbits.js";
 import { picturesView } from "./pictures.js";
 import { keepName, promptView, who } from "./prompt.js";
-import { listen, post, takeToken } from "./stream.js";
+import { listen, post, reportOf, takeToken } from "./stream.js";
 import { findingsView, logView, showAge, showHello, showProgress, showSample } from "./told.js";
 import { ageText } from "./text.js";
 
@@ -37,6 +37,7 @@ const heard = {
     findings.clear();
     log.clear();
     prompt.heardHello();
+    document.body.classList.add("told");
     showHello(hello);
     showTitle();
   },
@@ -63,10 +64,17 @@ const heard = {
     prompt.close();
     stop.end();
     showEnd(end);
+    if (end.report) keepReport(end);
     showLink();
     showTitle();
   },
 };
+
+/** Asks for the report at once: the run stays a while for who did. */
+async function keepReport(end) {
+  const blob = await reportOf(run.token, end.report);
+  if (blob && run.ended === end) offerReport(blob, run.hello?.run_id || "report");
+}
 
 /** Age of the newest sample, ms: when it was sent, the way, and since then; null before the first. */
 function age() {
@@ -86,7 +94,7 @@ function showLink() {
   const since = ms === null ? "" : ` The newest data are ${ageText(ms)} old.`;
   const texts = {
     connecting: "Connecting to the run …",
-    live: run.stopping ? "STOP was taken: the machine is made safe." : "",
+    live: !run.hello ? "Connected. The run has not begun yet." : run.stopping ? "STOP was taken: the machine is made safe." : "",
     lost: `Connection lost: ${run.why}.${since} What is shown may be out of date. Trying again ${seconds ? `in ${seconds} s` : "now"}.`,
     refused: `The run refuses this page: ${run.why || "its token is missing or another run's"}. Open the address that the run printed.`,
   };
@@ -95,7 +103,8 @@ function showLink() {
   const text = run.ended ? "" : texts[run.link];
   if ($("link").textContent !== text) $("link").textContent = text;
   $("link").hidden = !text;
-  document.body.classList.toggle("old", Boolean(stands));
+  document.body.classList.toggle("stale", Boolean(stands));
+  stop.link(!run.hello || run.link === "live");
   $("old").hidden = !stands;
   $("old").textContent = ms === null ? "No data yet." : `No new data for ${ageText(ms)}: the plots stand still.`;
   if (!run.ended) showAge(ms, Boolean(stands));
@@ -112,6 +121,7 @@ function start() {
     opened: () => { run.link = "live"; clockDifference.least = Infinity; showLink(); },
     lost: ({ inMs, why }) => { Object.assign(run, { link: "lost", why, retryAt: Date.now() + inMs }); showLink(); },
     refused: (why) => { Object.assign(run, { link: "refused", why }); showLink(); },
+    gone: () => { if (mine === run.token) showGone(); },
     over: () => run.ended !== null || mine !== run.token,
   });
   return showLink();

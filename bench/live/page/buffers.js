@@ -36,6 +36,13 @@ class Rows {
     return this.n++;
   }
 
+  /** Least and greatest of a channel in a row: anew, or beside what is there; NaN is nothing. */
+  put(name, row, low, high, anew) {
+    const [lows, highs] = [this.low.get(name), this.high.get(name)];
+    if (anew || !(lows[row] <= low)) lows[row] = anew || !Number.isNaN(low) ? low : lows[row];
+    if (anew || !(highs[row] >= high)) highs[row] = anew || !Number.isNaN(high) ? high : highs[row];
+  }
+
   /** First row at or after a time. */
   from(t) {
     let [a, b] = [0, this.n];
@@ -57,7 +64,8 @@ export class History {
     this.bucket = NaN;
   }
 
-  /** Takes a block of `samples`; rows that do not go on in time are left out (a reconnection sends the newest block again). */
+  /** Takes a block of `samples`. Its first bucket may be the last one of the block before, which was not full then; what is
+   * older comes again after a reconnection, and is left out. */
   append(block) {
     const t = float64(block.t);
     const columns = this.names.map((name) => {
@@ -65,21 +73,18 @@ export class History {
       return of ? [name, float32(of.min), float32(of.max)] : [name, null, null];
     });
     for (let k = 0; k < t.length; k++) {
-      if (!(t[k] > this.last)) continue;
+      if (!(t[k] >= this.last)) continue;
+      const again = t[k] === this.last;
       this.last = t[k];
-      const row = this.fine.add(t[k]);
-      const bucket = Math.floor(t[k] / COARSE_S);
+      const row = again ? this.fine.n - 1 : this.fine.add(t[k]);
+      const bucket = Math.floor(t[k] / COARSE_S + 1e-6);
       const begins = bucket !== this.bucket;
       this.bucket = bucket;
       const wide = begins ? this.coarse.add(t[k]) : this.coarse.n - 1;
       for (const [name, low, high] of columns) {
-        const a = low ? low[k] : NaN;
-        const b = high ? high[k] : NaN;
-        this.fine.low.get(name)[row] = a;
-        this.fine.high.get(name)[row] = b;
-        const [lows, highs] = [this.coarse.low.get(name), this.coarse.high.get(name)];
-        lows[wide] = begins || a < lows[wide] ? a : lows[wide];
-        highs[wide] = begins || b > highs[wide] ? b : highs[wide];
+        const [a, b] = low ? [low[k], high[k]] : [NaN, NaN];
+        this.fine.put(name, row, a, b, !again);
+        this.coarse.put(name, wide, a, b, begins);
       }
     }
   }

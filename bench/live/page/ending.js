@@ -4,13 +4,17 @@ import { element } from "./told.js";
 import { quantityText, shownIn, withUncertainty } from "./text.js";
 
 const $ = (id) => document.getElementById(id);
-const SAYS = "STOP ends the run and makes the machine safe. It is no emergency stop.";
+const UNSURE = "No connection: STOP may not get through. Stop at the terminal; in danger use the emergency stop.";
+const SAYS = "STOP ends the run and makes the machine safe.";
+const ORDER = ["FAIL", "INDETERMINATE", "PASS"]; // then those that nothing judged
 const TONES = { PASS: "pass", DONE: "pass", FAIL: "fail", ERROR: "fail", ABORTED: "fail", INDETERMINATE: "open" };
 
 /** The STOP button; `send()` posts. It can be pressed again until the run has taken it. */
 export function stopView(send, changed) {
+  let standing = SAYS; // what is said unless the connection is lost
+  let linked = true;
   const says = (text, wrong) => {
-    $("stopsays").textContent = text;
+    $("stoptext").textContent = text;
     $("stopsays").classList.toggle("wrong", wrong);
   };
   $("stop").addEventListener("click", async () => {
@@ -19,23 +23,34 @@ export function stopView(send, changed) {
     if (ok) {
       $("stop").disabled = true;
       $("stop").textContent = "STOPPING";
-      says("The run has taken STOP: the machine is made safe, which may take as long as the rotor takes to slow down.", false);
+      standing = "The run has taken STOP: the machine is made safe, which may take as long as the rotor takes to slow down.";
+      says(standing, false);
       changed();
     } else {
-      const why = status ? `the run refused it (${status})${reply.text ? `: ${reply.text}` : ""}` : "nothing answers";
+      const why = status ? `the run refused it (${status})${reply.error ? `: ${reply.error}` : ""}` : "nothing answers";
       says(`STOP did not get through: ${why}. Press it again, or Ctrl-C at the terminal; in danger the emergency stop.`, true);
     }
   });
   return {
     allow(may) {
-      $("stop").hidden = !may;
+      $("stop").hidden = $("noemergency").hidden = !may;
       $("stop").disabled = false;
       $("stop").textContent = "STOP";
-      says(may ? SAYS : "This page only watches: the run can be stopped at its terminal.", false);
+      standing = may ? SAYS : "This page only watches: the run can be stopped at its terminal.";
+      says(standing, false);
+    },
+    /** Whether there is a connection. */
+    link(is) {
+      if (is !== linked) says(is ? standing : UNSURE, !is);
+      linked = is;
     },
     end() { $("stopbar").hidden = true; },
     begin() { $("stopbar").hidden = false; },
   };
+}
+
+function verdictOf({ verdict }) {
+  return (verdict || "").toUpperCase();
 }
 
 function resultRow(result) {
@@ -44,12 +59,11 @@ function resultRow(result) {
   const size = (x) => (typeof x === "number" ? x / factor : null);
   const value = typeof result.value === "number" ? (result.value - offset) / factor : null;
   const [told, U] = withUncertainty(value, size(result.U));
-  const verdict = (result.verdict || "").toUpperCase();
-  const cells = [["", quantityText(result.name), "Quantity"], ["n", told, "Value"], ["n", U, "± U"], ["", unit, "Unit"],
-    [`verdict ${TONES[verdict] || ""}`, verdict && verdict !== "NONE" ? verdict : "–", "Verdict"]];
-  for (const [kind, text, label] of cells) {
+  const verdict = verdictOf(result);
+  const cells = [["", quantityText(result.name)], ["n", told], ["n", U], ["", unit],
+    [`verdict ${TONES[verdict] || ""}`, verdict && verdict !== "NONE" ? verdict : "–"]];
+  for (const [kind, text] of cells) {
     const cell = element("td", kind, text);
-    cell.dataset.label = label;
     row.append(cell);
   }
   return row;
@@ -60,10 +74,30 @@ export function showEnd(end) {
   $("ending").className = `card ending ${TONES[end.outcome] || "open"}`;
   $("outcome").textContent = end.outcome;
   $("reason").textContent = [end.reason, `exit status ${end.status}`].filter(Boolean).join(" · ");
-  $("results").hidden = !end.results?.length;
-  $("results").tBodies[0].replaceChildren(...(end.results || []).map(resultRow));
-  $("report").hidden = !end.report;
+  const rank = (result) => ORDER.indexOf(verdictOf(result)) + 1 || ORDER.length;
+  const results = (end.results || []).filter((r) => typeof r.value === "number").sort((a, b) => rank(a) - rank(b));
+  const missing = (end.results || []).filter((r) => typeof r.value !== "number").map((r) => quantityText(r.name));
+  $("results").hidden = !results.length;
+  $("results").tBodies[0].replaceChildren(...results.map(resultRow));
+  $("missing").hidden = !missing.length;
+  $("missing").textContent = results.length ? `Not measured: ${missing.join(", ")}.` : "Nothing was measured.";
+  $("report").hidden = !end.report && !end.folder;
+  $("reportlink").hidden = !end.report;
+  $("reportsave").hidden = true;
   if (end.report) $("reportlink").setAttribute("href", end.report);
-  $("reportplace").textContent = end.folder ? `It lies in ${end.folder}.` : "";
+  $("reportplace").textContent = end.folder ? `The run lies in ${end.folder}` : "";
+  if (!$("bar").hasAttribute("value")) $("bar").hidden = true;
   $("ending").focus({ preventScroll: true });
+}
+
+/** The report as a file to keep, which this page holds for as long as it is open. */
+export function offerReport(blob, name) {
+  $("reportsave").href = URL.createObjectURL(blob);
+  $("reportsave").download = `${name}.html`;
+  $("reportsave").hidden = false;
+}
+
+/** The run's server has ended: nothing can be opened there any more. */
+export function showGone() {
+  $("reportlink").hidden = true;
 }

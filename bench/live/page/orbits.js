@@ -1,6 +1,5 @@
 // Orbits of the shaft: equal axes, the ring that the shaft may not touch, zones, the last turns and where it is now.
 
-const SIDE = 240;
 const MARGIN = 1.12; // of what has to fit
 
 /** The half side of the picture in m, and a round scale bar for it. */
@@ -19,10 +18,10 @@ function circle(ctx, centre, radius) {
   ctx.stroke();
 }
 
-function drawZones(ctx, orbit, scale, palette) {
-  const centre = SIDE / 2;
+function drawZones(ctx, side, orbit, scale, palette) {
+  const centre = side / 2;
   ctx.fillStyle = ctx.strokeStyle = palette.zone;
-  ctx.font = "11px system-ui, sans-serif";
+  ctx.font = "10px system-ui, sans-serif";
   ctx.textAlign = "center";
   ctx.lineWidth = 1;
   const radii = [0, ...orbit.zones.map((z) => z.radius_m)];
@@ -33,35 +32,43 @@ function drawZones(ctx, orbit, scale, palette) {
   letters.forEach((letter, k) => {
     const outer = radii[k + 1] ?? Math.max(radii[k] * 1.1, orbit.clearance_m || 0);
     const at = (radii[k] + outer) / 2 * scale;
-    if ((outer - radii[k]) * scale > 12 && at < centre - 6) ctx.fillText(letter, centre + at * Math.SQRT1_2, centre - at * Math.SQRT1_2 + 4);
+    if ((outer - radii[k]) * scale > 9 && at < centre - 6) ctx.fillText(letter, centre + at * Math.SQRT1_2, centre - at * Math.SQRT1_2 + 4);
   });
 }
 
-function drawAxes(ctx, orbit, palette, bar, scale) {
-  const centre = SIDE / 2;
+function drawAxes(ctx, side, orbit, palette, bar, scale) {
+  const centre = side / 2;
   ctx.strokeStyle = palette.grid;
   ctx.lineWidth = 1;
   ctx.beginPath();
   ctx.moveTo(centre, 0);
-  ctx.lineTo(centre, SIDE);
+  ctx.lineTo(centre, side);
   ctx.moveTo(0, centre);
-  ctx.lineTo(SIDE, centre);
+  ctx.lineTo(side, centre);
   ctx.stroke();
   ctx.fillStyle = ctx.strokeStyle = palette.ink;
   ctx.font = "11px system-ui, sans-serif";
+  const label = (text, x, y) => { // on the paper, over whatever circle passes there
+    ctx.save();
+    ctx.lineWidth = 4;
+    ctx.strokeStyle = palette.paper;
+    ctx.strokeText(text, x, y);
+    ctx.restore();
+    ctx.fillText(text, x, y);
+  };
   ctx.textAlign = "right";
-  ctx.fillText(orbit.x, SIDE - 3, centre - 4);
+  label(orbit.x, side - 3, centre - 4);
   ctx.textAlign = "left";
-  ctx.fillText(orbit.y, centre + 4, 11);
+  label(orbit.y, centre + 4, 11);
   ctx.beginPath();
-  ctx.moveTo(6, SIDE - 6);
-  ctx.lineTo(6 + bar * scale, SIDE - 6);
+  ctx.moveTo(6, side - 6);
+  ctx.lineTo(6 + bar * scale, side - 6);
   ctx.stroke();
-  ctx.fillText(`${+(bar * 1e6).toPrecision(2)} µm`, 6, SIDE - 11);
+  ctx.fillText(`${+(bar * 1e6).toPrecision(2)} µm`, 6, side - 11);
 }
 
-function drawTrace(ctx, x, y, scale, palette) {
-  const centre = SIDE / 2;
+function drawTrace(ctx, side, x, y, scale, palette) {
+  const centre = side / 2;
   const px = (k) => centre + x[k] * scale;
   const py = (k) => centre - y[k] * scale;
   ctx.strokeStyle = palette.lines[0];
@@ -89,22 +96,23 @@ export function orbitOf(orbit, palette) {
   let seen = [new Float32Array(0), new Float32Array(0)];
   const draw = (zoom) => {
     const [x, y] = seen;
+    const side = canvas.clientWidth || 240;
     const ratio = window.devicePixelRatio || 1;
-    if (canvas.width !== Math.round(SIDE * ratio)) canvas.width = canvas.height = Math.round(SIDE * ratio);
+    if (canvas.width !== Math.round(side * ratio)) canvas.width = canvas.height = Math.round(side * ratio);
     const ctx = canvas.getContext("2d");
     ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
-    ctx.clearRect(0, 0, SIDE, SIDE);
+    ctx.clearRect(0, 0, side, side);
     const colours = palette();
     const { half, bar } = scaleOf(orbit, x, y, zoom);
-    const scale = SIDE / 2 / half;
-    drawAxes(ctx, orbit, colours, bar, scale);
-    drawZones(ctx, orbit, scale, colours);
+    const scale = side / 2 / half;
+    drawZones(ctx, side, orbit, scale, colours);
     if (orbit.clearance_m) {
       ctx.strokeStyle = colours.limit;
       ctx.lineWidth = 1.6;
-      circle(ctx, SIDE / 2, orbit.clearance_m * scale);
+      circle(ctx, side / 2, orbit.clearance_m * scale);
     }
-    drawTrace(ctx, x, y, scale, colours);
+    drawAxes(ctx, side, orbit, colours, bar, scale);
+    drawTrace(ctx, side, x, y, scale, colours);
     let reach = 0;
     for (let k = 0; k < x.length; k++) reach = Math.max(reach, Math.hypot(x[k], y[k]));
     const share = orbit.clearance_m ? `, ${Math.round(100 * reach / orbit.clearance_m)} % of the clearance ${+(orbit.clearance_m * 1e6).toPrecision(3)} µm` : "";

@@ -81,7 +81,7 @@ export function picturesView(orbitOf) {
     for (const plot of now.plots) plot.redraw();
     redrawOrbits();
   });
-  new ResizeObserver(ask).observe($("plots"));
+  new ResizeObserver(() => { ask(); redrawOrbits(); }).observe($("pictures"));
 
   return {
     /** A run begins: its channels and orbits. */
@@ -89,7 +89,7 @@ export function picturesView(orbitOf) {
       Object.assign(now, { history, panels: panelsOf(hello.channels), last: {}, held: null, lost: 0, after: [] });
       now.orbits = (hello.orbits || []).map((orbit) => ({ name: orbit.name, view: orbitOf({ zones: [], ...orbit }, () => palette) }));
       $("orbits").replaceChildren(...now.orbits.map((o) => o.view.node));
-      $("closer").hidden = !now.orbits.length;
+      $("round").hidden = !now.orbits.length;
       redrawOrbits();
       const groups = groupsOf(now.panels);
       makeTabs(groups);

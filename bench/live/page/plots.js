@@ -2,7 +2,7 @@
 /* global uPlot */
 
 import { bandOf } from "./buffers.js";
-import { decimalsOf, fixed, shownIn } from "./text.js";
+import { clock, decimalsOf, fixed, shownIn } from "./text.js";
 
 const MOST_LINES = 4; // in one plot; more are unreadable
 const POINTS = 600;
@@ -85,6 +85,12 @@ function drawLimits(panel, palette) {
   };
 }
 
+/** Ticks of the upright axis with as many decimals as they need. */
+function tickTexts(_, ticks, __, ___, step) {
+  const decimals = Math.max(0, Math.ceil(-Math.log10(step) - 1e-9));
+  return ticks.map((t) => (decimals > 5 ? t.toExponential(1) : fixed(t, decimals)));
+}
+
 function optionsOf(panel, palette, width, hooks) {
   const lines = panel.channels.flatMap((channel, k) => ["high", "low"].map(() => (
     { label: channel.name, width: 1, stroke: () => palette().lines[k], points: { show: false }, spanGaps: false })));
@@ -94,8 +100,8 @@ function optionsOf(panel, palette, width, hooks) {
     cursor: { drag: { x: false, y: false }, points: { show: false }, y: false },
     scales: { x: { time: false }, y: { range: rangeOf(panel) } },
     series: [{}, ...lines],
-    bands: panel.channels.map((_, k) => ({ series: [2 * k + 1, 2 * k + 2], fill: () => `${palette().lines[k]}55` })),
-    axes: [{ ...axis, size: 28, values: (_, ticks) => ticks.map((t) => `${+t.toFixed(2)} s`), space: 70 }, { ...axis, size: 58 }],
+    bands: panel.channels.map((_, k) => ({ series: [2 * k + 1, 2 * k + 2], fill: () => `${palette().lines[k]}3a` })),
+    axes: [{ ...axis, size: 28, values: (_, ticks) => ticks.map((t) => (t < 600 ? `${+t.toFixed(2)} s` : clock(t))), space: 70 }, { ...axis, size: 58, values: tickTexts }],
     hooks,
   };
 }
@@ -108,6 +114,20 @@ function limitText({ lower, upper, shown }) {
   return (a === null ? `limit ${b}` : `least ${a}`).replaceAll("-", "−");
 }
 
+/** The limits of all channels of a plot, where they are the same. */
+function commonLimit(panel) {
+  const texts = new Set(panel.channels.map(limitText));
+  return texts.size === 1 ? [...texts][0] : null;
+}
+
+function captionOf(panel) {
+  const caption = document.createElement("figcaption");
+  caption.textContent = panel.unit ? `${panel.heading} / ${panel.unit}` : panel.heading;
+  const limit = commonLimit(panel);
+  if (limit) caption.appendChild(document.createElement("span")).textContent = limit;
+  return caption;
+}
+
 function legendOf(panel) {
   const list = document.createElement("ul");
   list.className = "legend";
@@ -118,7 +138,7 @@ function legendOf(panel) {
     item.append(`${channel.name} `);
     const value = item.appendChild(document.createElement("b"));
     item.append(` ${panel.unit}`);
-    const limit = limitText(channel);
+    const limit = commonLimit(panel) === null && limitText(channel);
     if (limit) item.appendChild(document.createElement("span")).textContent = limit;
     return value;
   });
@@ -129,7 +149,7 @@ function legendOf(panel) {
 export function plotOf(panel, palette) {
   const node = document.createElement("figure");
   node.className = "plot";
-  node.appendChild(document.createElement("figcaption")).textContent = panel.unit ? `${panel.heading} / ${panel.unit}` : panel.heading;
+  node.appendChild(captionOf(panel));
   const frame = node.appendChild(document.createElement("div"));
   frame.className = "frame";
   const { list, values } = legendOf(panel);
@@ -156,7 +176,8 @@ export function plotOf(panel, palette) {
     if (chart.width !== frame.clientWidth && frame.clientWidth > 0) chart.setSize({ width: frame.clientWidth, height: HEIGHT });
     chart.batch(() => {
       chart.setData(data, false);
-      if (view.x.length) chart.setScale("x", { min: end - seconds, max: end });
+      const from = Math.max(0, end - seconds); // a run begins at 0 and fills the picture from its left
+      chart.setScale("x", { min: from, max: from + seconds });
     });
     label();
   };

@@ -46,7 +46,7 @@ export function promptView(send, changed) {
     if (open?.id !== id) return; // answered meanwhile, here or elsewhere
     busy(false);
     if (status === 409) refuse(`It was answered already${reply.by ? ` by ${reply.by}` : ""}.`);
-    else if (!ok) refuse(status ? `The run did not take the answer (${status}). ${reply.text || ""}` : "The answer did not get through. Try again, or answer at the terminal.");
+    else if (!ok) refuse(status ? `The run did not take the answer (${status}). ${reply.error || ""}` : "The answer did not get through. Try again, or answer at the terminal.");
     else if (reply.accepted === false) refuse(`It was answered already${reply.by ? ` by ${reply.by}` : ""}.`);
   };
   $("free").addEventListener("submit", (event) => {
@@ -82,7 +82,8 @@ export function promptView(send, changed) {
     answered({ id, answer: text, by }) {
       if (open && open.id !== id) return;
       close();
-      $("answered").textContent = `Answered ${text === "" ? "“done”" : `“${text}”`}${by ? ` by ${by}` : ""}.`;
+      const said = text === "" ? "Answered: done" : `Answered: “${text}”`;
+      $("answered").textContent = typeof text === "string" ? `${said}${by ? ` (${by})` : ""}.` : "The question was taken back.";
       $("answered").hidden = false;
     },
     /** The connection is made anew: if the question still stands it comes again. */

@@ -46,6 +46,15 @@ export function eventParser(told) {
   };
 }
 
+/** What a text of JSON says; nothing where it is something else. */
+function read(text) {
+  try {
+    return JSON.parse(text) ?? {};
+  } catch {
+    return {};
+  }
+}
+
 /** One reading of /events until it ends. Throws what fetch throws, and {status} where the server refuses. */
 async function readOnce(token, heard, opened) {
   const stopper = new AbortController();
@@ -53,7 +62,7 @@ async function readOnce(token, heard, opened) {
   try {
     const options = { headers: { [HEADER]: token }, cache: "no-store", signal: stopper.signal };
     const reply = await fetch("events", options);
-    if (!reply.ok) throw { status: reply.status, text: (await reply.text()).slice(0, 300) };
+    if (!reply.ok) throw { status: reply.status, text: read(await reply.text()).error };
     opened();
     const push = eventParser(heard);
     const reader = reply.body.pipeThrough(new TextDecoderStream()).getReader();
@@ -70,24 +79,26 @@ async function readOnce(token, heard, opened) {
   }
 }
 
-/** Keeps reading until `over()`; tells `lost({inMs, why})` between two tries and `refused(why)` where no try can help.
+/** The report, which the run keeps serving for a while where it was asked for at once; null where there is none. */
+export async function reportOf(token, path) {
+  try {
+    const reply = await fetch(path, { headers: { [HEADER]: token }, cache: "no-store" });
+    return reply.ok ? await reply.blob() : null;
+  } catch {
+    return null;
+  }
+}
+
+/** Keeps reading until `over()`, then tells `gone()`; tells `lost({inMs, why})` between two tries and `refused(why)` where no try can help.
  * Returns a function that forgets the pause and tries again at once. */
-export function listen(token, { heard, opened, lost, refused, over }) {
+export function listen(token, { heard, opened, lost, refused, over, gone }) {
   let pause = FIRST_MS;
   let wake = () => {};
   const wait = (ms) => new Promise((done) => {
     const timer = setTimeout(done, ms);
     wake = () => { clearTimeout(timer); done(); };
   });
-  const tell = (name, data) => {
-    let read;
-    try {
-      read = JSON.parse(data);
-    } catch {
-      return; // half an event of a server that is going down
-    }
-    heard(name, read);
-  };
+  const tell = (name, data) => heard(name, read(data));
   (async () => {
     while (!over()) {
       let why = "the run closed the connection";
@@ -97,11 +108,12 @@ export function listen(token, { heard, opened, lost, refused, over }) {
         if (error.status === 401 || error.status === 403) return refused(error.text);
         why = error.status ? error.text || `the run answered ${error.status}` : "nothing comes from the run";
       }
-      if (over()) return;
+      if (over()) break;
       lost({ inMs: pause, why });
       await wait(pause);
       pause = Math.min(LONGEST_MS, 2 * pause);
     }
+    return gone();
   })();
   return () => { pause = FIRST_MS; wake(); };
 }
@@ -116,14 +128,7 @@ export async function post(token, path, body) {
       cache: "no-store",
       signal: AbortSignal.timeout(POST_MS),
     });
-    const text = await reply.text();
-    let read = {};
-    try {
-      read = JSON.parse(text);
-    } catch {
-      read = { text };
-    }
-    return { ok: reply.ok, status: reply.status, reply: read };
+    return { ok: reply.ok, status: reply.status, reply: read(await reply.text()) };
   } catch {
     return { ok: false, status: 0, reply: {} };
   }

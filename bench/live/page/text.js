@@ -23,14 +23,20 @@ export function fixed(value, decimals) {
   return (Number(text) === 0 ? text.replace("-", "") : text).replace("-", "−");
 }
 
-/** A value and its expanded uncertainty as a report prints them: U to two digits, the value to the same place. */
+const SUPERSCRIPTS = { "-": "⁻", 0: "⁰", 1: "¹", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶", 7: "⁷", 8: "⁸", 9: "⁹" };
+
+/** A value and its expanded uncertainty as a report prints them: U to two digits, the value to the same place, very small
+ * ones with a power of ten. */
 export function withUncertainty(value, U) {
-  if (value === null || value === undefined) return ["–", "–"];
+  if (typeof value !== "number") return ["–", "–"];
   if (!(U > 0) || !Number.isFinite(U)) return [Number(value.toPrecision(6)).toString().replace("-", "−"), "–"];
-  const place = Math.floor(Math.log10(U)) - 1;
-  const decimals = Math.max(0, -place);
-  const rounded = (x) => (place > 0 ? Math.round(x / 10 ** place) * 10 ** place : x);
-  return [fixed(rounded(value), decimals), fixed(rounded(U), decimals)];
+  const last = Number(U.toExponential(1).split("e")[1]) - 1;
+  const power = last < -6 ? 3 * Math.floor(Math.log10(Math.max(Math.abs(value), U)) / 3) : 0;
+  const told = (x) => {
+    if (last > 0) return fixed(Math.round(x / 10 ** last) * 10 ** last, 0);
+    return fixed(x / 10 ** power, power - last) + (power ? `·10${String(power).replace(/[-0-9]/g, (c) => SUPERSCRIPTS[c])}` : "");
+  };
+  return [told(value), told(U)];
 }
 
 /** 01:05, or 1:01:05 from an hour on. */

@@ -3,7 +3,7 @@
 import { ageText, clock, fixed } from "./text.js";
 
 const MOST_LINES = 300;
-const LOUD = { error: 0, aborted: 0, indeterminate: 1, note: 2 };
+const LOUD = { error: 0, indeterminate: 1, note: 2 };
 const $ = (id) => document.getElementById(id);
 
 export function element(tag, kind, text) {
@@ -42,29 +42,28 @@ export function showProgress({ stage, step, done, total, left_s }) {
   $("stage").textContent = stage || "Running";
   $("step").textContent = step || "";
   const bar = $("bar");
-  bar.hidden = false;
   if (total) {
     bar.max = total;
     bar.value = Math.min(done, total);
   } else {
     bar.removeAttribute("value");
   }
-  bar.hidden = !total && !done;
+  bar.hidden = false; // without a count it moves: something goes on
   $("count").textContent = total && done <= total ? `${done} of ${total} steps` : done ? `${done} steps` : "";
   $("left").textContent = typeof left_s === "number" ? `${clock(left_s)} left` : "";
 }
 
-/** Findings by effect, then in the order in which they came. */
+/** Findings by effect, then in the order in which they came; one with the id of another takes its place (its count has grown). */
 export function findingsView() {
-  let told = [];
+  const told = new Map();
   const draw = () => {
-    $("nofinding").hidden = told.length > 0;
-    const sorted = [...told].sort((a, b) => (LOUD[a.effect] ?? 2) - (LOUD[b.effect] ?? 2));
+    $("nofinding").hidden = told.size > 0;
+    const sorted = [...told.values()].sort((a, b) => (LOUD[a.effect] ?? 2) - (LOUD[b.effect] ?? 2));
     $("findinglist").replaceChildren(...sorted.map(findingNode));
   };
   return {
-    clear() { told = []; draw(); },
-    add(finding) { told.push(finding); draw(); },
+    clear() { told.clear(); draw(); },
+    add(finding) { told.set(finding.id ?? told.size, finding); draw(); },
   };
 }
 
