@@ -9,13 +9,13 @@ READY := .venv/.ready
 # Tests start hundreds of processes: without its bytecode every one of them would compile the project again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test check format ci-long faults links fuzz campaigns plants sound moved golden former bench clean lock setup wheel
+.PHONY: demo test check format ci-long faults links browser fuzz campaigns plants sound moved golden former bench clean lock setup wheel
 
 demo: setup
 	$(BIN)/bench run amb-calibration --rig tsbs12 --seed 1
 
 test: setup
-	$(BIN)/python -m pytest -q -m "not long and not faults and not links" -n 3 --dist loadgroup
+	$(BIN)/python -m pytest -q -m "not long and not faults and not links and not browser" -n 3 --dist loadgroup
 
 check: setup
 	$(BIN)/ruff format --check .
@@ -34,8 +34,14 @@ faults: setup
 links: setup
 	$(BIN)/python -m pytest -q -m links tests/links
 
+# The live page in Chromium, which has to be installed (Debian: apt-get install chromium), or CHROMIUM=/path/to/it. It makes the
+# README's pictures anew.
+browser: setup
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check "playwright>=1.55"
+	$(BIN)/python -m pytest -q -m browser tests/browser
+
 fuzz: setup
-	$(BIN)/python -m pytest -q -m "hypothesis and not long" -n 2 --hypothesis-profile=search --timeout 600
+	$(BIN)/python -m pytest -q -m "hypothesis and not long and not browser" -n 2 --hypothesis-profile=search --timeout 600
 
 campaigns: setup
 	$(BIN)/bench campaign tsbs-identification --count 1000 --keep none

@@ -27,6 +27,7 @@ BenchError
     AnotherHost      heartbeats of another host came in
     OperatorAbort    the operator said stop
     SignalAbort      SIGINT, SIGTERM or SIGHUP
+    StopAsked        STOP at the live page
 """
 
 from __future__ import annotations
@@ -173,3 +174,7 @@ class OperatorAbort(Aborted):
 
 class SignalAbort(Aborted):
     """SIGINT, SIGTERM or SIGHUP arrived."""
+
+
+class StopAsked(SignalAbort):
+    """A person asked the run to stop, at its live page."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import _thread
 import signal
 import threading
 from collections.abc import Callable, Iterator
@@ -13,6 +14,16 @@ HANGUP = getattr(signal, "SIGHUP", None)
 """A terminal that closed, such as a connection over ssh that was lost; Windows has none."""
 
 
+def wake_main_thread() -> None:
+    """Have the main thread call its handler of SIGINT as soon as it runs Python. No signal is sent."""
+    _thread.interrupt_main(signal.SIGINT)
+
+
+def are_heard() -> bool:
+    """Whether handlers can be installed here: Python calls them in the main thread alone."""
+    return threading.current_thread() is threading.main_thread()
+
+
 @contextmanager
 def delivered_to(callback: Callable[[str], None]) -> Iterator[None]:
     """Within the block, SIGINT, SIGTERM and SIGHUP call `callback` with the signal's name instead of their usual effect.
@@ -21,7 +32,7 @@ def delivered_to(callback: Callable[[str], None]) -> Iterator[None]:
     SIGHUP that is ignored at the start stays so: `nohup` asks for that. Outside of the main thread Python allows no
     handlers, and the block runs without.
     """
-    if threading.current_thread() is not threading.main_thread():
+    if not are_heard():
         yield
         return
 

@@ -6,11 +6,13 @@ A line that is drawn anew on a terminal, plain lines elsewhere. `bench.display_u
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from typing import Protocol, TextIO
 
+from bench.findings import Finding
 from bench.progress_text import PLAIN_WIDTH, counted, time_left, wrapped
+from bench.question import Elsewhere, Question
 
 PLAIN_LINES = 20  # about as many lines in a run, however many steps it has
 
@@ -38,8 +40,12 @@ class Progress(Protocol):
         """A line of the log."""
         ...
 
-    def asking(self, question: str) -> AbstractContextManager[None]:
-        """Put a question on lines of its own; within the block a person types."""
+    def asking(self, question: Question) -> AbstractContextManager[Elsewhere | None]:
+        """Put a question on lines of its own; within the block a person types, or answers elsewhere if that is possible."""
+        ...
+
+    def found(self, look: Callable[[], Iterable[Finding]]) -> None:
+        """There may be findings; a display that shows none does not look."""
         ...
 
 
@@ -75,9 +81,11 @@ class PlainProgress:
             self._stream.flush()
 
     @contextmanager
-    def asking(self, question: str) -> Iterator[None]:
+    def asking(self, question: Question) -> Iterator[None]:
         self.line(wrapped(question, PLAIN_WIDTH))
         yield
+
+    def found(self, look: Callable[[], Iterable[Finding]]) -> None: ...
 
 
 class Silent:
@@ -87,13 +95,14 @@ class Silent:
     def total(self, steps: int) -> None: ...
     def step(self, text: str) -> None: ...
     def line(self, text: str) -> None: ...
+    def found(self, look: Callable[[], Iterable[Finding]]) -> None: ...
 
     @contextmanager
     def busy(self, text: str) -> Iterator[None]:
         yield
 
     @contextmanager
-    def asking(self, question: str) -> Iterator[None]:
+    def asking(self, question: Question) -> Iterator[None]:
         yield
 
 

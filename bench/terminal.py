@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import textwrap
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from typing import TextIO
 
@@ -13,7 +13,9 @@ from rich import progress
 from rich.console import Console
 from rich.table import Column
 
+from bench.findings import Finding
 from bench.progress_text import columns, counted, time_left, wrapped
+from bench.question import Question
 
 BAR, LONGEST_STAGE = 12, 20  # columns
 REDRAWN_HZ = 4.0  # while nothing moves
@@ -71,7 +73,7 @@ class TerminalProgress:
             self._console.print(told, markup=False, highlight=False, soft_wrap=True)
 
     @contextmanager
-    def asking(self, question: str) -> Iterator[None]:
+    def asking(self, question: Question) -> Iterator[None]:
         self.stop()
         with suppress(OSError):
             self._console.print(
@@ -85,6 +87,8 @@ class TerminalProgress:
             yield
         finally:
             self.start()
+
+    def found(self, look: Callable[[], Iterable[Finding]]) -> None: ...
 
     def _line_of(self, *, redrawn: bool) -> progress.Progress:
         """The line: part, bar, count, time, what is done. While nothing moves a thread draws it, with the time so far."""

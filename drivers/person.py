@@ -10,6 +10,7 @@ from typing import Generic, Literal, TypeVar
 from bench.clock import Clock
 from bench.errors import InterlockError, OperatorAbort
 from bench.procedure.roles import NOTHING, Load, Plane, Push, Side
+from bench.question import CONSOLE, Answer, Choice, Question
 from bench.recording.recorder import Recorder
 from bench.rigfile.envelope import Envelope
 from drivers.answers import Misunderstood, after, degrees_of, reading_of, skipped, unknown
@@ -29,7 +30,7 @@ class ConsoleOperator:
     `attended` is False where nobody is there unless what has to be done asks for somebody."""
 
     def __init__(
-        self, prompt: Callable[[str], str], clock: Clock, envelope: Envelope, then: LineOperator | None
+        self, prompt: Callable[[Question], str], clock: Clock, envelope: Envelope, then: LineOperator | None
     ) -> None:
         self._prompt, self._clock, self._envelope, self._then = prompt, clock, envelope, then
         self._hanging: Load | None = None  # on the hanger; None is not known
@@ -155,7 +156,8 @@ class ConsoleOperator:
             f"{LANDED} It will be lifted once its probes are known to count the right way. Push it by hand midway "
             f"between its rings {way.axis} ({counts}) until it touches them there, one that lies with about as much as it "
             "weighs, and hold it there.",
-            "it is held there", True, _Other("To leave it out, as it was shown before: type skip.", skipped),
+            "it is held there", True,
+            _Other("To leave it out, as it was shown before: type skip.", skipped, (Choice("Leave it out", "skip"),)),
         )  # fmt: skip
         return done and (self._then is None or self._then.push(way))
 
@@ -195,10 +197,11 @@ class ConsoleOperator:
 
     def _typed(self, axis: str, instrument: str, unit: str) -> float:
         asked = after(self.standing(), f"Read {instrument} of axis {axis}; do not touch the machine.")
-        question = f"{asked}\nType the number, in {unit} or with its unit; stop ends the run."
-        answer = self._answer(question)
+        hint = f"Type the number, in {unit} or with its unit; stop ends the run."
+        field = f"The number, in {unit} or with its unit"
+        answer = self._answer(Question(asked, hint, field=field))
         while (shown := reading_of(answer, unit)) is None:
-            answer = self._answer(f"{unknown(answer)}\n{question}")
+            answer = self._answer(Question(f"{unknown(answer)}\n{asked}", hint, field=field))
         return shown
 
     def ask(self, question: str) -> bool:
@@ -207,10 +210,11 @@ class ConsoleOperator:
         Raises:
             OperatorAbort: the person answered stop.
         """
-        asked = f"{after(self.standing(), question)}\nType yes or no, or stop to end the run."
-        answer = self._answer(asked)
+        asked, hint = after(self.standing(), question), "Type yes or no, or stop to end the run."
+        buttons = (Choice("Yes", YES[1]), Choice("No", NO[1]))
+        answer = self._answer(Question(asked, hint, buttons, field=""))
         while answer not in (*YES, *NO):
-            answer = self._answer(f"{unknown(answer)}\n{asked}")
+            answer = self._answer(Question(f"{unknown(answer)}\n{asked}", hint, buttons, field=""))
         return answer in YES
 
     def goes_on(self, wrong: str) -> bool:
@@ -275,8 +279,9 @@ class ConsoleOperator:
         instead."""
         asks = after(self.approach() or self.standing(), what)
         more = ", ? for more" if other.more else ""
-        question = f"{asks}\nPress Enter when {when}, or type stop to end the run{more}."
-        answer = self._answer(question)
+        hint = f"Press Enter when {when}, or type stop to end the run{more}."
+        buttons = (Choice(f"Done: {when}", DONE[0]), *other.choices)
+        answer = self._answer(Question(asks, hint, buttons, other.more))
         while answer not in DONE:
             try:
                 if (really := other.read(answer)) is not None:
@@ -284,19 +289,20 @@ class ConsoleOperator:
                 why = other.more if answer == "?" else f"{unknown(answer)} {other.more}".rstrip()
             except Misunderstood as error:
                 why = str(error)
-            answer = self._answer(f"{why}\n{question}")
+            answer = self._answer(Question(f"{why}\n{asks}", hint, buttons, other.more))
         return asked
 
-    def _answer(self, question: str) -> str:
-        """What the person types, in small letters; into the recording with its question.
+    def _answer(self, question: Question) -> str:
+        """What the person answers, in small letters; into the recording with its question and who answered.
 
         Raises:
             OperatorAbort: stop.
         """
-        answer = self._prompt(question).strip()
+        given = self._prompt(question)
+        answer, by = given.strip(), given.by if isinstance(given, Answer) else CONSOLE
         self._clock.sleep(0.01)
         if self.recorder is not None:
-            self.recorder.event("operator", question=question, answer=answer)
+            self.recorder.event("operator", question=question, answer=answer, by=by)
         if answer.lower() in STOP:
             raise OperatorAbort(f"the operator answered {answer!r}")
         return answer.lower()
@@ -304,7 +310,9 @@ class ConsoleOperator:
 
 @dataclass(frozen=True)
 class _Other(Generic[T]):
-    """What a person may say that was done instead: how they say it, and what makes something of their answer."""
+    """What a person may say that was done instead: how they say it, what makes something of their answer, and the buttons of a
+    page for it."""
 
     more: str = ""
     read: Callable[[str], T | None] = lambda _: None
+    choices: tuple[Choice, ...] = ()

@@ -117,10 +117,14 @@ def run(
     spec: o.Spec = None,
     require_verdict: o.RequireVerdict = False,
     go_on: o.GoOn = None,
+    live: o.Live = False,
+    live_port: o.LivePort = None,
+    live_bind: o.LiveBind = None,
     verbose: o.Verbose = False,
 ) -> int:
     """Run a procedure on a rig, or go on with a run that was stopped. The last line on standard output is the run directory."""
     from bench.cli.compose import Request
+    from bench.cli.live import asked_page
     from bench.cli.run import run_command
 
     named = backend.value if backend else "" if go_on else "sim"
@@ -130,7 +134,7 @@ def run(
         clear_fault=clear_fault, out=out, operator=operator.value if operator else None, report=not no_report,
         calibrations=calibrations, allow_expired=allow_expired, spec=spec, require_verdict=require_verdict, continues=go_on,
     )  # fmt: skip
-    return run_command(asked, verbose)
+    return run_command(asked, verbose, asked_page(live, live_port, live_bind))
 
 
 @app.command()
@@ -232,11 +236,15 @@ def serve(
         list[str] | None, typer.Option("--link", metavar="NAME=URL", help="Listen somewhere else; repeatable.")
     ] = None,
     fault: o.Faults = None,
+    live: o.Live = False,
+    live_port: o.LivePort = None,
+    live_bind: o.LiveBind = None,
 ) -> int:
     """Serve the simulated rig in real time, for `run --backend live` and for programs of your own.
 
     Prints an endpoint a line, then `ready`; ends on Ctrl-C.
     """
+    from bench.cli.live import asked_page
     from bench.cli.serve import ServeRequest, serve_command
 
     return serve_command(
@@ -249,6 +257,7 @@ def serve(
             truth_file=truth_file,
             links=tuple(link or ()),
             faults=tuple(fault or ()),
+            page=asked_page(live, live_port, live_bind),
         )
     )
 

@@ -5,55 +5,91 @@ from __future__ import annotations
 import os
 import select
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 
 from bench.clock import Clock
 from bench.errors import OperatorAbort
+from bench.question import Answer, Elsewhere, Question
 from bench.run.supervisor import Supervisor
 
 LOOK_S = 0.05
 CLOSED = "standard input is closed: nobody can answer"
 
 
-Asking = Callable[[str], AbstractContextManager[None]]
-"""Puts a question where a person sees it; within the block they type."""
+Asking = Callable[[Question], AbstractContextManager[Elsewhere | None]]
+"""Puts a question where a person sees it; within the block they type, or answer elsewhere where that is possible."""
 
 
 @contextmanager
-def quietly(question: str) -> Iterator[None]:
+def quietly(question: Question) -> Iterator[None]:
     """The question as it is, on standard error, where no display is in the way."""
     sys.stderr.write(f"{question}\n")
     sys.stderr.flush()
     yield
 
 
-def blocking(supervisor: Supervisor, asking: Asking = quietly) -> Callable[[str], str]:
+def blocking(supervisor: Supervisor, asking: Asking = quietly) -> Callable[[Question], Answer]:
     """For a simulated rig, whose time stands still meanwhile; a signal ends the waiting at once."""
 
-    def ask(question: str) -> str:
-        with asking(question), supervisor.interruptible():
-            answer = sys.stdin.readline()
-        if not answer:
-            raise OperatorAbort(CLOSED)
-        return answer
+    def wait(seconds: float) -> None:
+        time.sleep(seconds)
+        supervisor.checkpoint()
 
+    def ask(question: Question) -> Answer:
+        with asking(question) as elsewhere, supervisor.interruptible():
+            return _typed(sys.stdin.readline()) if elsewhere is None else _first(keyboard(), elsewhere, wait)
+
+    keyboard = _Once()
     return ask
 
 
-def attentive(clock: Clock, asking: Asking = quietly) -> Callable[[str], str]:
+def attentive(clock: Clock, asking: Asking = quietly) -> Callable[[Question], Answer]:
     """For a live rig: its clock runs while the person thinks, so that heartbeats, recording and interlocks go on."""
-    keyboard = Keyboard(sys.stdin.fileno())
+    keyboard = _Once()
 
-    def ask(question: str) -> str:
-        with asking(question):
-            while (answer := keyboard.line()) is None:
-                clock.sleep(LOOK_S)
-        if not answer:
-            raise OperatorAbort(CLOSED)
-        return answer
+    def ask(question: Question) -> Answer:
+        with asking(question) as elsewhere:
+            return _first(keyboard(), elsewhere, clock.sleep)
 
     return ask
+
+
+def _first(keyboard: Keyboard | None, elsewhere: Elsewhere | None, wait: Callable[[float], None]) -> Answer:
+    """The first answer that comes, typed or from elsewhere. Where nobody can type any more, elsewhere is left."""
+    while True:
+        line = keyboard.line() if keyboard is not None else ""
+        if line or (line is not None and elsewhere is None):
+            return _typed(line) if elsewhere is None else elsewhere.offer(_typed(line))
+        if elsewhere is not None and (answer := elsewhere.look()) is not None:
+            return answer
+        wait(LOOK_S)
+
+
+def _typed(line: str) -> Answer:
+    if not line:
+        raise OperatorAbort(CLOSED)
+    return Answer(line)
+
+
+class _Once:
+    """The keyboard, opened when it is asked for first and kept: it may hold a line that has begun. None where there is none."""
+
+    def __init__(self) -> None:
+        self._found: Keyboard | None = None
+
+    def __call__(self) -> Keyboard | None:
+        if self._found is None:
+            try:
+                self._found = Keyboard(sys.stdin.fileno())
+            except (
+                AttributeError,
+                OSError,
+                ValueError,
+            ):  # no standard input, one that is closed, or none of the system's
+                return None
+        return self._found
 
 
 class Keyboard:

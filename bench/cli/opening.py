@@ -22,6 +22,7 @@ from bench.link.health import Health
 from bench.link.session import Session, new_session
 from bench.procedure.rig import Rig
 from bench.procedure.roles import Operator
+from bench.question import Answer, Question
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile, linkurl
 from bench.rigfile.binding import HELD
@@ -233,7 +234,10 @@ def _released(controller: Controller) -> None:
 
 
 def _operators(
-    kind: str, line: LineOperator | None, controller: Controller, prompt: Callable[[Clock], Callable[[str], str]]
+    kind: str,
+    line: LineOperator | None,
+    controller: Controller,
+    prompt: Callable[[Clock], Callable[[Question], Answer]],
 ) -> list[Operator]:
     """The operator, and whoever else records what is done by hand. `prompt` makes what asks a person."""
     from drivers.person import ConsoleOperator

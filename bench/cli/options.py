@@ -48,6 +48,16 @@ Calibrations = Annotated[
     Path | None,
     typer.Option("--calibrations", metavar="DIR", help="Folder of calibrations; default beside the rig file."),
 ]
+Live = Annotated[bool, typer.Option("--live", help="Show what happens on a page; its address is printed.")]
+LivePort = Annotated[
+    int | None, typer.Option("--live-port", min=0, max=65535, help="Of the live page; default any free one.")
+]
+LiveBind = Annotated[
+    str | None,
+    typer.Option(
+        "--live-bind", metavar="ADDR", help="Address of the live page; default 127.0.0.1, this computer alone."
+    ),
+]
 Verbose = Annotated[
     bool, typer.Option("--verbose", "-v", help="Say every result and every note, not only what was judged.")
 ]

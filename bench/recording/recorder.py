@@ -28,6 +28,7 @@ from bench.errors import RecordingError
 from bench.link.frames import FRAME, FrameBatch
 from bench.recording.integrity import Integrity
 from bench.recording.mcapwriter import McapWriter
+from bench.recording.tap import Tap
 from bench.rigfile import RigFile
 from bench.rigfile.aliases import with_full_names
 from bench.samples import TICKS, SampleBlock, StreamLayout
@@ -76,6 +77,7 @@ class Recorder:
         self._watched: dict[str, list[npt.NDArray[np.float64]]] = {}  # by channel: what came of it
         self._header = header
         self.wall: dict[str, str] = {}
+        self.tap: Tap | None = None  # where somebody may look at samples as they come
         self._streams = {s.name: s for s in streams}
         self._failure: BaseException | None = None
         self._closed = False
@@ -156,6 +158,8 @@ class Recorder:
         self._check(block)
         if len(block):
             self._put("samples", block)
+            if self.tap is not None:
+                self.tap.put(block)
             for name in self._watched if self._watched.keys() <= {TICKS, *block.columns} else ():
                 self._watched[name].append(np.array(block.ticks if name == TICKS else block.columns[name], np.float64))
             self.integrity.add("samples", block.stream, len(block))

@@ -6,11 +6,12 @@ The runner and `bench analyse` both come here, and neither hands over anything b
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from itertools import chain
 from typing import Any
 
+from bench.calibration import Calibration
 from bench.errors import AnalysisError, BenchError, RecordingError, SignalAbort
 from bench.findings import Effect, Finding
 from bench.link.counts import LinkCounts
@@ -158,7 +159,7 @@ def yielded(procedure: Procedure, recording: Recording[Any]) -> Iterator[Measure
     and of steps that are missing."""
     explained = False
     for item in chain(
-        _calibrations(recording),
+        of_calibrations(recording.calibrations),
         continued.findings(recording),
         incomplete_steps(recording),
         procedure.analyse(recording),
@@ -169,10 +170,10 @@ def yielded(procedure: Procedure, recording: Recording[Any]) -> Iterator[Measure
         yield from missing_steps(procedure, recording)
 
 
-def _calibrations(recording: Recording[Any]) -> Iterator[Finding]:
+def of_calibrations(calibrations: Sequence[Calibration]) -> Iterator[Finding]:
     """Calibrations that the run used though they were overdue (only --allow-expired lets it), that rest on such, that carry
     no digest, or that were adopted although their run did not pass."""
-    for c in recording.calibrations:
+    for c in calibrations:
         name = f"the calibration {c.procedure} of {c.date[:10]}"
         if c.expired:
             yield Finding("calibration-expired", f"{name} was used though it had expired on {c.due}", c.run_id)
@@ -180,7 +181,7 @@ def _calibrations(recording: Recording[Any]) -> Iterator[Finding]:
             if used.state == "expired":
                 text = f"{name} rests on {used.procedure} of {used.date[:10]}, which had expired on {used.due}"
                 yield Finding("calibration-expired", text, c.run_id)
-            here = {other.procedure: other.run_id for other in recording.calibrations}
+            here = {other.procedure: other.run_id for other in calibrations}
             if here.get(used.procedure, used.run_id) != used.run_id:
                 text = f"{name} rests on {used.run_id}; this run uses {here[used.procedure]} beside it"
                 yield Finding("calibrations-of-two-runs", text, c.run_id)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -37,6 +37,7 @@ from bench.errors import (
     SpeedContradicts,
     StateContradicts,
     StateNotReached,
+    StopAsked,
 )
 from bench.findings import Effect, Finding
 from bench.procedure.roles import RigState
@@ -49,13 +50,13 @@ from bench.recording.takeover import taking_over
 from bench.rigfile.registers import RegisterRefused
 from bench.run import provenance
 from bench.run.continued import IDENTITY
-from bench.run.evaluation import Ending
+from bench.run.evaluation import Ending, of_calibrations
 from bench.run.job import Job, OpenRig
 from bench.run.supervisor import SafeStep, Supervisor
 
 logger = logging.getLogger("bench.run.runner")
 CODES: tuple[tuple[type[BaseException], str], ...] = (
-    (SignalAbort, "signal"), (OperatorAbort, "operator-stop"), (DriveFault, "drive-fault"),
+    (StopAsked, "operator-stop"), (SignalAbort, "signal"), (OperatorAbort, "operator-stop"), (DriveFault, "drive-fault"),
     (DeviceFault, "controller-fault"), (AnotherHost, "another-host"), (NotDischarged, "not-discharged"),
     (InterlockError, "interlock"),
     (RegisterRefused, "device-refused"), (DeviceUnreadable, "device-unreadable"), (NoReply, "no-reply"),
@@ -135,13 +136,15 @@ def _moved(
                 if live.identity:
                     recorder.event(IDENTITY, said=dict(live.identity))
                 progress.stage(f"bring the rig to {procedure.state}")
+                progress.found(lambda: (*live.findings, *of_calibrations(recorder.calibrations)))
                 transition(rig, RigState.READY)
                 rig.levitation.write(procedure.settings(job.rig, job.plan))
                 transition(rig, procedure.state)
                 up = True
                 progress.stage("acquire")
                 progress.total(_steps_to_do(job))
-                procedure.acquire(rig, job.plan, cast(Recorder, WatchedSteps(recorder, progress, live.catch_up)))
+                steps = WatchedSteps(recorder, progress, live.catch_up, lambda: rig.health().findings())
+                procedure.acquire(rig, job.plan, cast(Recorder, steps))
         except BaseException as error:
             # Whatever it is, also SystemExit: the machine is made safe first.
             cause = error
@@ -192,11 +195,14 @@ def _recording_or_not(step: SafeStep, live: OpenRig) -> SafeStep:
 
 
 class WatchedSteps:
-    """The recorder as `acquire` sees it, with each step told to the progress display, and over only when telemetry has
-    reached its end: what `acquire` commands next does not act within it."""
+    """The recorder as `acquire` sees it, with each step told to the progress display, and what is wrong with the link by then,
+    and over only when telemetry has reached its end: what `acquire` commands next does not act within it."""
 
-    def __init__(self, recorder: Recorder, progress: Progress, catch_up: Callable[[], None]) -> None:
-        self._recorder, self._progress, self._catch_up = recorder, progress, catch_up
+    def __init__(
+        self, recorder: Recorder, progress: Progress, catch_up: Callable[[], None],
+        troubles: Callable[[], Iterable[Finding]] = tuple,
+    ) -> None:  # fmt: skip
+        self._recorder, self._progress, self._catch_up, self._troubles = recorder, progress, catch_up, troubles
 
     @contextmanager
     def step(self, kind: str, **labels: Any) -> Iterator[None]:
@@ -204,6 +210,7 @@ class WatchedSteps:
         with self._recorder.step(kind, **labels):
             yield
         self._catch_up()
+        self._progress.found(self._troubles)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._recorder, name)

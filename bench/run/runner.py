@@ -97,6 +97,7 @@ def run(
         release()  # a disk that is full by now still takes the record
         with progress.busy("analyse"):
             result, recording = _concluded(job, directory, record, machine, supervisor)
+        progress.found(lambda: [Finding(f.code, f.text, f.where, f.effect) for f in result.record.findings])
         result = _written(directory, result)
         if machine.truth is not None:
             with suppress(OSError):  # what a simulated rig drew is drawn again from its seed
@@ -186,7 +187,8 @@ def _reported(
             report(directory.path, result.record, job.procedure, recording)
         return result
     except SignalAbort as error:
-        added = findings_of([Finding("signal", f"{error} while the report was built", "report", Effect.ERROR)])
+        code = cause_of(error)[1].code
+        added = findings_of([Finding(code, f"{error} while the report was built", "report", Effect.ERROR)])
         record = replace(result.record, outcome=Outcome.ABORTED, findings=(*result.record.findings, *added))
     except Exception as error:
         logger.warning("the report failed: %s", error)

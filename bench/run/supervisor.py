@@ -5,21 +5,23 @@ Signals only set a flag while the machine moves; the clock's pump asks `check` a
 nothing moves (start-up, analysis) a signal raises at once.
 
 During make-safe nothing is raised: a second signal is logged and ignored, a first one waits until the machine is safe
-(`checkpoint`). A step that takes too long, or whose link is dead, is logged and the next one still runs. What a step
-calls must not block outside of `clock.sleep`; links never do (`receive` never waits).
+(`checkpoint`). A person at the live page stops a run the same way (`stop`). A step that takes too long, or whose link is dead,
+is logged and the next one still runs. What a step calls must not block outside of `clock.sleep`; links never do (`receive`
+never waits).
 """
 
 from __future__ import annotations
 
 import logging
 import math
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import Enum
 
 from bench import os_signals
-from bench.errors import LinkError, SignalAbort
+from bench.errors import LinkError, SignalAbort, StopAsked
 from bench.findings import Effect, Finding
 
 logger = logging.getLogger("bench.run.supervisor")
@@ -45,7 +47,9 @@ class Supervisor:
 
     def __init__(self) -> None:
         self._mode = _Mode.AT_ONCE
-        self._signal: str | None = None
+        self._stop: tuple[str, type[SignalAbort]] | None = None  # what stops the run, first come
+        self._heard = threading.Lock()  # while it is held the main thread goes on hearing its signals
+        self._hearing = self._waking = False
         self._answered = False  # the signal has ended what it was to end
         self._unanswered: list[
             tuple[str, bool]
@@ -56,15 +60,30 @@ class Supervisor:
 
     @property
     def stopped_by(self) -> str | None:
-        """The name of the signal that stops this run, if one arrived in time to do so."""
-        return self._signal
+        """The name of the signal that stops this run, or who asked for it, if that came in time to do so."""
+        return self._stop[0] if self._stop is not None else None
 
     @contextmanager
     def watching(self) -> Iterator[Supervisor]:
         """SIGINT, SIGTERM and SIGHUP come here within the block and go where they went before after it."""
         with os_signals.delivered_to(self._received):
-            yield self
+            self._hearing = os_signals.are_heard()
+            try:
+                yield self
+            finally:
+                with self._heard:
+                    self._hearing = False
         self._answer()
+
+    def stop(self, who: str) -> None:
+        """Stop the run as a signal does, at the wish of a person, from any thread: at the next check while the machine moves,
+        at once where nothing does and signals are heard. Returns at once."""
+        if not self._noted(f"STOP ({who})", StopAsked):
+            return
+        with self._heard:
+            if self._hearing and self._mode is _Mode.AT_ONCE:
+                self._waking = True
+                os_signals.wake_main_thread()
 
     @contextmanager
     def moving(self) -> Iterator[None]:
@@ -149,14 +168,22 @@ class Supervisor:
         )
 
     def _received(self, name: str) -> None:
-        first = self._signal is None
+        if self._waking:  # it is no signal: `stop` wants this thread to look
+            self._waking = False
+            if self._mode is _Mode.AT_ONCE:
+                self.checkpoint()
+            return
+        if self._noted(name, SignalAbort) and self._mode is _Mode.AT_ONCE:
+            self.checkpoint()
+
+    def _noted(self, name: str, kind: type[SignalAbort]) -> bool:
+        """Whether it is the first that stops the run; one that changes nothing now is answered with a line."""
+        first = self._stop is None
         if not first or self._mode is _Mode.LATER:
             self._unanswered.append((name, first))
-        if not first:
-            return
-        self._signal = name
-        if self._mode is _Mode.AT_ONCE:
-            self.checkpoint()
+        if first:
+            self._stop = name, kind
+        return first
 
     def checkpoint(self) -> None:
         """End here if a signal has asked for it.
@@ -164,8 +191,9 @@ class Supervisor:
         Raises:
             SignalAbort: one has, and nothing has been ended for it yet.
         """
-        if self._signal is not None and not self._answered:
-            raise SignalAbort(f"stopped by {self._signal}")
+        if self._stop is not None and not self._answered:
+            name, kind = self._stop
+            raise kind(f"stopped by {name}")
 
     def _answer(self) -> None:
         """A line for each signal that changes nothing now: whoever sent it sees that it came."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,7 +15,9 @@ from bench.cli.campaign.facts import adopt, request_of
 from bench.cli.campaign.steps import Planned
 from bench.cli.compose import prepare
 from bench.errors import BenchError, ConfigError
+from bench.findings import Finding
 from bench.progress import Progress
+from bench.question import Elsewhere, Question
 from bench.record.outcomes import Outcome
 from bench.run import runner
 from bench.run.runner import RunResult
@@ -72,8 +74,11 @@ class StepProgress:
     def busy(self, text: str) -> AbstractContextManager[None]:
         return self.base.busy(f"{self.title} {text}")
 
-    def asking(self, question: str) -> AbstractContextManager[None]:
+    def asking(self, question: Question) -> AbstractContextManager[Elsewhere | None]:
         return self.base.asking(question)
+
+    def found(self, look: Callable[[], Iterable[Finding]]) -> None:
+        self.base.found(look)
 
 
 def run_chain(asked: Asked, directory: CampaignDirectory, progress: Progress) -> list[Done]:

@@ -1,0 +1,308 @@
+"""A server that speaks the live page's protocol with a made run: what the page does is tried on it without a machine.
+
+`python tests/browser/standin.py` serves one to look at.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import mimetypes
+import threading
+import time
+from dataclasses import dataclass, field
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+PAGE = Path(__file__).resolve().parents[2] / "bench" / "live" / "page"
+TOKEN = "a-token-of-the-tests"
+CSP = "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'self'"
+MICRON, RPM = 1e-6, np.pi / 30
+ENVELOPE_M, CLEARANCE_M, SPEED_RAD_S = 150e-6, 250e-6, 45.0
+
+
+def channels() -> list[dict[str, Any]]:
+    """30 channels to be drawn and two that are words, as a rig file has them."""
+    found = []
+
+    def add(name: str, unit: str, kind: str, group: str, upper: float | None = None, lower: float | None = None,
+            **shown: Any) -> None:  # fmt: skip
+        found.append(
+            {"name": name, "unit": unit, "kind": kind, "group": group, "lower": lower, "upper": upper, **shown}
+        )
+
+    for place, letter in (("inboard", "i"), ("outboard", "o")):
+        for axis in "yx":
+            add(
+                f"pos_{axis}{letter}", "m", "position", place, ENVELOPE_M, -ENVELOPE_M, display_unit="um", factor=MICRON
+            )
+        for coil in ("y{}_p", "y{}_n", "x{}_p", "x{}_n"):
+            add(f"i_{coil.format(letter)}", "A", "current", place, 12.5)
+    add("pos_z", "m", "position", "axial", display_unit="um", factor=MICRON)
+    for coil in ("z_p", "z_n"):
+        add(f"i_{coil}", "A", "current", "axial", 12.5)
+    for k in range(1, 9):
+        add(f"i_m{k}", "A", "current", "motor", 12.5)
+    for name in ("temp_i", "temp_o", "temp_m"):
+        add(name, "K", "temperature", "", 353.0, display_unit="degC", factor=1.0, offset=273.15)
+    add("speed", "rad/s", "speed", "", 75.0, display_unit="r/min", factor=RPM)
+    add("supply", "V", "supply", "", 160.0, 130.0)
+    add("angle", "rad", "other", "", display_unit="deg", factor=np.pi / 180)
+    add("host_age", "s", "other", "", display_unit="ms", factor=1e-3)
+    add("state", "1", "state", "")
+    add("fault", "1", "state", "")
+    return found
+
+
+def hello(**changed: Any) -> dict[str, Any]:
+    orbits = [
+        {"name": place, "x": f"pos_x{letter}", "y": f"pos_y{letter}", "clearance_m": CLEARANCE_M,
+         "zones": [{"name": name, "radius_m": share * CLEARANCE_M} for name, share in (("A/B", 0.3), ("B/C", 0.4), ("C/D", 0.5))]}
+        for place, letter in (("inboard", "i"), ("outboard", "o"))
+    ]  # fmt: skip
+    return {
+        "schema": 1, "run_id": "20261128T101500Z-amb-calibration-tsbs12", "procedure": "amb-calibration", "rig": "tsbs12",
+        "title": "AMB force constants by hanging masses", "backend": "sim", "served": False, "seed": 1, "visit": 1,
+        "started": "2026-11-28T10:15:00+00:00", "simulated": True, "may_stop": True, "channels": channels(), "orbits": orbits,
+        "states": {"1": "READY", "2": "LEVITATED"}, "faults": {"0": "NONE"}, **changed,
+    }  # fmt: skip
+
+
+def packed(values: Any, kind: str) -> str:
+    return base64.b64encode(np.asarray(values, kind).tobytes()).decode()
+
+
+def samples(begin_s: float, end_s: float) -> dict[str, Any]:
+    """What the channels do between two times, in buckets of 10 ms."""
+    t = np.arange(round(begin_s * 100), round(end_s * 100)) / 100
+    rng = np.random.default_rng(round(begin_s * 100))
+    told = {}
+    for k, channel in enumerate(channels()):
+        low = _course(k, channel, t) + _spread(channel) * (rng.standard_normal(t.size) - 3)
+        high = low + _spread(channel) * 6
+        told[channel["name"]] = {"min": packed(low, "<f4"), "max": packed(high, "<f4"), "last": float(high[-1])}
+    turn = np.linspace(0, 8 * np.pi, 400) + begin_s * SPEED_RAD_S
+    orbits = {
+        name: {
+            "x": packed(size * np.cos(turn + lag) + 1e-6 * rng.standard_normal(400), "<f4"),
+            "y": packed(0.8 * size * np.sin(turn) + 1e-6 * rng.standard_normal(400) - 2e-5, "<f4"),
+        }
+        for name, size, lag in (("inboard", 6e-5, 0.4), ("outboard", 3e-5, -0.2))
+    }
+    return {"t": packed(t, "<f8"), "lost": 0, "channels": told, "orbits": orbits, "state": "LEVITATED", "fault": "NONE",
+            "speed_rpm": SPEED_RAD_S / RPM + 0.2 * float(rng.standard_normal()), "age_ms": 10.0, "sent_ms": 1e3 * time.time()}  # fmt: skip
+
+
+def _course(k: int, channel: dict[str, Any], t: np.ndarray) -> np.ndarray:
+    slow = np.sin(2 * np.pi * t / (7 + k % 5) + k)
+    match channel["kind"]:
+        case "position":
+            return 4e-5 * slow
+        case "current":
+            return 3.0 + 0.3 * (k % 4) + 0.8 * slow
+        case "temperature":
+            return 300.0 + 0.1 * slow
+        case "speed":
+            return SPEED_RAD_S + 0.05 * slow
+        case "supply":
+            return 148.0 + 0.4 * slow
+        case _:
+            return 0.01 + 0.005 * slow
+
+
+def _spread(channel: dict[str, Any]) -> float:
+    return {"position": 2e-6, "current": 0.02, "temperature": 0.02, "speed": 0.01, "supply": 0.05}.get(
+        channel["kind"], 1e-4
+    )
+
+
+@dataclass
+class Run:
+    """A made run: what was told so far, who listens, what was answered."""
+
+    told: list[tuple[str, dict[str, Any]]] = field(default_factory=list)
+    changed: threading.Condition = field(default_factory=threading.Condition)
+    answers: list[dict[str, Any]] = field(default_factory=list)
+    stops: list[dict[str, Any]] = field(default_factory=list)
+    streaming: bool = False
+    silent: bool = False  # nothing comes, and the connection stays: a network that hangs
+    closed: int = 0  # connections up to this number are to end
+    ending: bool = False
+    opened: int = 0
+    holds: bool = False  # a request for events waits for its answer
+    refuses: int = 0  # status of what is asked, 0: serve
+    began: float = field(default_factory=time.monotonic)
+
+    def tell(self, name: str, data: dict[str, Any]) -> None:
+        with self.changed:
+            self.told.append((name, data))
+            self.changed.notify_all()
+
+    def drop(self) -> None:
+        """End every connection that there is."""
+        with self.changed:
+            self.closed = self.opened
+            self.changed.notify_all()
+
+
+class Handler(BaseHTTPRequestHandler):
+    protocol_version = "HTTP/1.1"
+    server: Standin
+
+    def log_message(self, *_: Any) -> None: ...
+
+    def do_GET(self) -> None:
+        path = self.path.partition("?")[0]
+        if path == "/events":
+            self._events()
+        elif path == "/report.html":
+            self._send(200, b"<!DOCTYPE html><title>Report</title><h1>The report</h1>", "text/html; charset=utf-8")
+        else:
+            file = PAGE / (path.lstrip("/") or "index.html")
+            if file.parent != PAGE or not file.is_file():
+                self._send(404, b"not found", "text/plain")
+            else:
+                self._send(200, file.read_bytes(), mimetypes.guess_type(file.name)[0] or "text/plain")
+
+    def do_POST(self) -> None:
+        body = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
+        run = self.server.run
+        if self.headers.get("X-Levbench-Token") != TOKEN or run.refuses:
+            self._send(run.refuses or 403, b'{"error": "refused"}', "application/json")
+        elif self.path == "/stop":
+            run.stops.append(body)
+            self._send(202, b"{}", "application/json")
+        elif any(a["id"] == body["id"] for a in run.answers):
+            self._send(409, json.dumps({"accepted": False, "by": run.answers[-1]["by"]}).encode(), "application/json")
+        else:
+            run.answers.append(body)
+            self._send(200, json.dumps({"accepted": True, "by": body["by"]}).encode(), "application/json")
+            run.tell("answered", body)
+
+    def _send(self, status: int, body: bytes, kind: str) -> None:
+        self.send_response(status)
+        self.send_header("Content-Type", kind)
+        self.send_header("Content-Length", str(len(body)))
+        self.send_header("Content-Security-Policy", CSP)
+        self.send_header("X-Content-Type-Options", "nosniff")
+        self.send_header("Cache-Control", "no-store")
+        self.end_headers()
+        self.wfile.write(body)
+
+    def _events(self) -> None:
+        run = self.server.run
+        if self.headers.get("X-Levbench-Token") != TOKEN or run.refuses:
+            self._send(run.refuses or 403, b'{"error": "the token is missing or another run\'s"}', "application/json")
+            return
+        while run.holds and not run.ending:
+            time.sleep(0.05)
+        self.send_response(200)
+        self.send_header("Content-Type", "text/event-stream")
+        self.send_header("Cache-Control", "no-store")
+        self.send_header("Connection", "close")
+        self.end_headers()
+        self.close_connection = True
+        run.opened += 1
+        mine, sent = run.opened, 0
+        t = 0.0 if mine == 1 else time.monotonic() - run.began  # the first page sees it from its beginning
+        try:
+            while mine > run.closed and not run.ending:
+                with run.changed:
+                    if sent >= len(run.told):
+                        run.changed.wait(0.05)
+                    new, sent = run.told[sent:], len(run.told)
+                for name, data in new:
+                    self._event(name, data)
+                now = time.monotonic() - run.began
+                if run.streaming and not run.silent and now - t >= 0.045:
+                    self._event("samples", samples(t, now))
+                    t = now
+        except OSError:
+            return
+
+    def _event(self, name: str, data: dict[str, Any]) -> None:
+        self.wfile.write(f"event: {name}\ndata: {json.dumps(data)}\n\n".encode())
+        self.wfile.flush()
+
+
+class Standin(ThreadingHTTPServer):
+    """The server on a free port of the loopback; `address` is what a run would print."""
+
+    daemon_threads = False  # they are waited for
+
+    def __init__(self, port: int = 0) -> None:
+        super().__init__(("127.0.0.1", port), Handler)
+        self.run = Run()
+        self.address = f"http://127.0.0.1:{self.server_port}/#{TOKEN}"
+
+    def __enter__(self) -> Standin:
+        threading.Thread(target=self.serve_forever, args=(0.05,), daemon=True).start()
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        self.shutdown()
+        self.run.ending = True
+        self.server_close()
+
+
+PROGRESS = {
+    "stage": "hanging masses",
+    "step": "M2 1.000 kg, loading",
+    "done": 23,
+    "total": 72,
+    "elapsed_s": 184.0,
+    "left_s": 391.0,
+}
+PROMPT = {
+    "id": 1, "free": True, "hint": "Another mass: its label (M1, M2, M3, M4, - for none); ? for more",
+    "question": "The shaft levitates: 130 V are on the coils, hands away from them.\nHang M3 on the hanger.\n"
+                "Press Enter when it hangs still, or type stop to end the run, ? for more.",
+    "choices": [{"label": "It hangs still", "answer": ""}],
+}  # fmt: skip
+FINDINGS = (
+    {"code": "calibration-due", "text": "The load cell's calibration is due on 2026-12-01.", "where": "load cell", "effect": "note"},
+    {"code": "missing-samples", "text": "3 of 12 000 samples are missing in step 12; its mean leaves them out.", "where": "hang 12",
+     "effect": "note"},
+    {"code": "load-not-still", "text": "The hanging mass swings: 0.8 N of 5 Hz.", "where": "hang 14", "effect": "indeterminate"},
+    {"code": "stuck-channel", "text": "pos_yi has stood on 12.3 µm for 1.0 s while the tick went on.", "where": "pos_yi", "effect": "error"},
+)  # fmt: skip
+LOG = (
+    "links: controller in this process",
+    "supply 148.0 V",
+    "lift: inboard, outboard, axial",
+    "hanging masses: 72 steps",
+)
+RESULTS = [
+    {"name": "K@inboard", "value": 75.004, "U": 0.21, "unit": "N/A", "verdict": "pass"},
+    {"name": "K@outboard", "value": 74.876, "U": 0.34, "unit": "N/A", "verdict": "pass"},
+    {"name": "i_0@inboard", "value": 0.01234, "U": 0.0031, "unit": "A", "verdict": "none"},
+    {"name": "runout@inboard", "value": 4.21e-6, "U": 2.1e-7, "unit": "m", "display_unit": "um", "factor": 1e-6, "verdict": "pass"},
+]  # fmt: skip
+
+
+def end(outcome: str, status: int, reason: str) -> dict[str, Any]:
+    done = outcome in ("PASS", "FAIL", "DONE", "INDETERMINATE")
+    return {"outcome": outcome, "status": status, "reason": reason, "report": "/report.html" if done else None,
+            "results": RESULTS if done else [], "folder": "runs/20261128T101500Z-amb-calibration-tsbs12"}  # fmt: skip
+
+
+def begin(run: Run, **changed: Any) -> None:
+    """A run that goes on."""
+    run.streaming = True
+    run.tell("hello", hello(**changed))
+    run.tell("progress", PROGRESS)
+    for text in LOG:
+        run.tell("log", {"text": text})
+
+
+if __name__ == "__main__":
+    with Standin(28600) as server:
+        begin(server.run)
+        server.run.tell("prompt", PROMPT)
+        for one in FINDINGS:
+            server.run.tell("finding", one)
+        print(server.address)  # noqa: T201
+        threading.Event().wait()

@@ -1,0 +1,87 @@
+"""The live page of real runs: questions answered at the page, STOP, how old the data are, the report at the end."""
+
+from __future__ import annotations
+
+import fcntl
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import real
+from test_page import COUNTED
+
+Open = Callable[..., Any]
+LOCK = Path("/tmp/levbench-locks/live")
+pytestmark = pytest.mark.timeout(300)
+
+
+@pytest.fixture
+def alone() -> Iterator[None]:
+    """One run in real time on a machine: two disturb each other's links."""
+    LOCK.parent.mkdir(exist_ok=True)
+    with open(LOCK, "w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield
+
+
+def test_a_person_at_the_page_answers_and_stops_a_served_run(
+    tmp_path: Path, alone: None, opened: Open, expect: Any
+) -> None:
+    with (
+        real.served("tsbs12") as links,
+        real.run(tmp_path, "amb-calibration", "--rig", "tsbs12", "--operator", "console", *links) as run,
+    ):
+        page = opened(run.address, height=3400, script=COUNTED).page
+        page.get_by_role("tab", name="All").click()
+        page.fill("#who", "Ann")
+        for asks in ("Hang M4", "Take every mass off"):
+            expect(page.locator("#question")).to_contain_text(asks, timeout=30_000)
+            page.locator("#choices button").first.click()
+            expect(page.locator("#answered")).to_have_text("Answered: done (page: Ann).")
+        expect(page.locator("#step")).to_contain_text("hang")
+        page.wait_for_timeout(10_000)
+        frames = page.evaluate("window.drawn")
+        channels = page.locator(".legend li").count()
+        if page.locator("#prompt").is_visible():
+            page.locator("#choices button").first.click()
+            expect(page.locator("#prompt")).to_be_hidden()
+        page.click("#stop")
+        expect(page.locator("#outcome")).to_have_text("ABORTED", timeout=30_000)
+        expect(page.locator("#reason")).to_contain_text("exit status 4")
+        page.close()
+        status, record = run.end()
+    assert status == 4
+    assert record["outcome"] == "ABORTED"
+    (found,) = [f for f in record["findings"] if f["code"] == "operator-stop"]
+    assert "Ann" in found["text"]
+    assert "make-safe-failed" not in {f["code"] for f in record["findings"]}
+    seconds = (frames[-1][0] - frames[0][0]) / 1000
+    ages = sorted(age for _, age in frames)
+    share = sum(age < 250 for age in ages) / len(ages)
+    print(f"{channels} channels: {len(frames) / seconds:.1f} frames/s over {seconds:.1f} s, age p50 {ages[len(ages) // 2]:.0f} ms, "
+          f"p99 {ages[int(0.99 * len(ages))]:.0f} ms, {100 * share:.2f} % younger than 250 ms")  # fmt: skip
+
+
+def test_a_simulated_run_to_its_report(tmp_path: Path, opened: Open, expect: Any) -> None:
+    with real.run(tmp_path, "amb-calibration", "--rig", "tsbs12", "--seed", "1") as run:
+        found = opened(run.address)
+        page = found.page
+        expect(page.locator("#simulated")).to_be_visible(timeout=30_000)
+        expect(page.locator("#outcome")).to_have_text("PASS", timeout=120_000)
+        rows = [row.split() for row in page.locator("#results tbody tr").all_inner_texts()]
+        with page.expect_popup() as popup:
+            page.click("#reportlink")
+        expect(popup.value.locator(".outcome strong")).to_have_text("PASS")
+        report = popup.value.locator("table").first.inner_text()
+        with page.expect_download() as download:
+            page.click("#reportsave")
+        kept = download.value.path().read_text(encoding="utf-8")
+        popup.value.close()
+        page.close()
+        status, record = run.end()
+    assert status == 0
+    assert kept == (record["folder"] / "report.html").read_text(encoding="utf-8")
+    assert len(rows) == len([m for m in record["measurements"] if m["value"] is not None])
+    assert any(row[-4] in report for row in rows)  # the same digits as on page 1
+    assert found.wrong == []
