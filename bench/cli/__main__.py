@@ -194,11 +194,15 @@ def serve(
         list[str] | None, typer.Option("--link", metavar="NAME=URL", help="Listen somewhere else; repeatable.")
     ] = None,
     fault: o.Faults = None,
+    live: o.Live = False,
+    live_port: o.LivePort = None,
+    live_bind: o.LiveBind = None,
 ) -> int:
     """Serve the simulated rig in real time, for `run --backend live` and for programs of your own.
 
     Prints an endpoint a line, then `ready`; ends on Ctrl-C.
     """
+    from bench.cli.live import asked_page
     from bench.cli.serve import ServeRequest, serve_command
 
     return serve_command(
@@ -211,6 +215,7 @@ def serve(
             truth_file=truth_file,
             links=tuple(link or ()),
             faults=tuple(fault or ()),
+            page=asked_page(live, live_port, live_bind),
         )
     )
 

@@ -170,8 +170,8 @@ def _result(m: Measurement) -> dict[str, Any]:
 
 
 @contextmanager
-def opened(asked: PageRequest, stop: Callable[[str], None]) -> Iterator[LivePage]:
-    """Serve a page within the block; `stop` asks the run to stop, with who wants it.
+def opened(asked: PageRequest, stop: Callable[[str], None] | None) -> Iterator[LivePage]:
+    """Serve a page within the block; `stop` asks the run to stop, with who wants it; None where nobody may.
 
     Raises:
         ConfigError: the port is in use, or there is no such address on this host.

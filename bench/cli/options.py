@@ -47,7 +47,7 @@ Calibrations = Annotated[
     Path | None,
     typer.Option("--calibrations", metavar="DIR", help="Folder of calibrations; default beside the rig file."),
 ]
-Live = Annotated[bool, typer.Option("--live", help="Show the run on a page; its address is printed.")]
+Live = Annotated[bool, typer.Option("--live", help="Show what happens on a page; its address is printed.")]
 LivePort = Annotated[
     int | None, typer.Option("--live-port", min=0, max=65535, help="Of the live page; default any free one.")
 ]

@@ -8,11 +8,14 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from bench.cli.compose import with_links
+from bench.cli.live import PageRequest
 from bench.cli.opening import SUBSTEPS
+from bench.cli.serve_live import Heard, ServedPage, watched
 from bench.clock import WallClock
 from bench.errors import ConfigError
 from bench.link import fault_injection
@@ -43,6 +46,7 @@ class ServeRequest:
     truth_file: Path | None = None
     links: tuple[str, ...] = ()
     faults: tuple[str, ...] = ()
+    page: PageRequest | None = None
 
 
 def serve_command(request: ServeRequest) -> int:
@@ -66,7 +70,10 @@ def serve_command(request: ServeRequest) -> int:
     truth = draw(rig, request.seed, _overrides(request.truth), visit=request.visit)
     if truth.machine.served is not None:
         on_link, in_device = fault_injection.of_a_line(on_link, in_device)
-    controller = (truth.machine.served or SimulatedController)(rig, truth, in_device, SUBSTEPS)
+        if request.page is not None:
+            raise ConfigError(f"--live: {rig.name} speaks a command line, of which no page is made; expected a rig that sends "
+                              "messages. Next: leave --live out, or give it to `bench run` on this rig")  # fmt: skip
+    controller: Any = (truth.machine.served or SimulatedController)(rig, truth, in_device, SUBSTEPS)
     wire = WireFaults(on_link, truth.noise, [rig.messages[name].identifier for name in rig.binding.telemetry])
     stopped: list[str] = []
     with ExitStack() as stack:
@@ -84,13 +91,21 @@ def serve_command(request: ServeRequest) -> int:
             lines += service.start()
         if request.truth_file is not None:
             write_truth(request.truth_file, truth)
-        server = Server(rig, controller, selector, ports, WallClock(), _say, services, wire)
+        page = None if request.page is None else stack.enter_context(watched(request.page, _say))
+        say = _say
+        if page is not None:
+            controller, say = Heard(rig, controller), partial(_say_both, page)
+        server = Server(rig, controller, selector, ports, WallClock(), say, services, wire)
+        if page is not None:
+            page.begin(rig, controller, server.pacer.bench_ns(), request.seed, request.visit)
         sys.stdout.write("".join(f"{line}\n" for line in [*lines, "ready"]))
         sys.stdout.flush()
         if request.faults:
             _say(fault_injection.announced([*on_link, *in_device]).text)
         server.run(lambda: bool(stopped))
         _say(f"{stopped[0]}: stopped, controller {controller.state}; {server.statistics()}")
+        if page is not None:
+            page.end(f"{stopped[0]}: the rig is not served any more")
     return 0
 
 
@@ -182,6 +197,11 @@ def write_truth(path: Path, truth: Truth) -> None:
         path.write_text(json.dumps(truth.facts, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     except OSError as error:
         raise ConfigError(f"--truth-file {path}: cannot be written: {error.strerror or error}") from error
+
+
+def _say_both(page: ServedPage, text: str) -> None:
+    _say(text)
+    page.say(text)
 
 
 def _say(text: str) -> None:

@@ -7,16 +7,16 @@ import json
 import select
 import socket
 from collections.abc import Callable, Mapping
+from contextlib import suppress
+from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from bench.live import gate
 from bench.live.gate import PAGE_POLICY, REPORT_POLICY, SECURE, Refused
 from bench.live.reading import Bounded
+from bench.live.site import Site
 from bench.question import Answer
-
-if TYPE_CHECKING:
-    from bench.live.server import LiveServer
 
 HEAD_S = 5.0  # for a whole request
 SEND_S = 10.0  # a client that takes nothing for so long is given up
@@ -33,7 +33,10 @@ class Handler(BaseHTTPRequestHandler):
 
     protocol_version = "HTTP/1.1"
     server_version = "levbench"
-    server: LiveServer
+
+    def __init__(self, site: Site, *of_the_server: Any) -> None:
+        self.site = site  # answered is within the next line
+        super().__init__(*of_the_server)
 
     def setup(self) -> None:
         super().setup()
@@ -53,7 +56,7 @@ class Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         path = self.path.partition("?")[0]
-        assets = self.server.site.assets
+        assets = self.site.assets
         if path in assets:
             self._guarded(lambda: self._send(200, assets[path].content_type, assets[path].content, PAGE_POLICY))
         elif path == "/events":
@@ -68,13 +71,14 @@ class Handler(BaseHTTPRequestHandler):
         if path in POSTED:
             self._guarded(self._answer if path == "/answer" else self._stop)
         else:
-            self._guarded(lambda: self._lacking(path, (*OPEN, *self.server.site.assets)))
+            self._guarded(lambda: self._lacking(path, (*OPEN, *self.site.assets)))
 
     def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
         """What the standard library refuses by itself, said as everything else; another method is not allowed."""
         self.close_connection = True
-        known = code == 501
-        self._refuse(405 if known else code, message or "no such request")
+        status = HTTPStatus.METHOD_NOT_ALLOWED if code == HTTPStatus.NOT_IMPLEMENTED else HTTPStatus(code)
+        with suppress(OSError):
+            self._refuse(status, status.phrase)
 
     def _lacking(self, path: str, others: tuple[str, ...]) -> None:
         raise Refused(405, "method: not this one here") if path in others else Refused(404, "no such page")
@@ -83,9 +87,9 @@ class Handler(BaseHTTPRequestHandler):
         """Refusals of all kinds; a client that is gone or too slow ends here."""
         try:
             try:
-                local = self.connection.getsockname()[0]
-                self.host = gate.check_host(self.headers, local, self.server.port, self.server.site.named)
-                gate.check_origin(self.headers, self.host)
+                local, port, *_ = self.connection.getsockname()
+                host = gate.check_host(self.headers, local, port, self.site.named)
+                gate.check_origin(self.headers, host)
                 serve()
             except Refused as refused:
                 self._refuse(refused.status, refused.text)
@@ -93,15 +97,15 @@ class Handler(BaseHTTPRequestHandler):
             pass
 
     def _events(self) -> None:
-        gate.check_token(self.headers, self.server.site.token)
-        if not self.server.reader_places.acquire(blocking=False):
+        gate.check_token(self.headers, self.site.token)
+        if not self.site.places.acquire(blocking=False):
             raise Refused(503, "too many pages are open. Next: close one of them")
         try:
             self._head(200, "text/event-stream; charset=utf-8", None, PAGE_POLICY, {"Set-Cookie": self._cookie()})
             self.end_headers()
-            with self.server.site.hub.reading() as reader:
+            with self.site.hub.reading() as reader:
                 silent = 0.0
-                while not self.server.site.hub.closed and not self._gone():
+                while not self.site.hub.closed and not self._gone():
                     part = reader.more(LOOK_S)
                     silent = 0.0 if part else silent + LOOK_S
                     if silent >= LIFE_S:
@@ -109,18 +113,18 @@ class Handler(BaseHTTPRequestHandler):
                     self._write(part)
                 self._write(reader.more(0.0))
         finally:
-            self.server.reader_places.release()
+            self.site.places.release()
 
     def _cookie(self) -> str:
         """For the report alone: a frame or a link sends no header of ours."""
-        name, value = self._cookie_name(), self.server.site.cookie
+        name, value = self._cookie_name(), self.site.cookie
         return f"{name}={value}; HttpOnly; SameSite=Strict; Path=/report.html"
 
     def _cookie_name(self) -> str:
-        return f"levbench-{self.server.port}"
+        return f"levbench-{self.connection.getsockname()[1]}"
 
     def _report(self) -> None:
-        site = self.server.site
+        site = self.site
         if not gate.same(gate.cookie_of(self.headers, self._cookie_name()), site.cookie):
             gate.check_token(self.headers, site.token)
         path = site.report
@@ -141,14 +145,14 @@ class Handler(BaseHTTPRequestHandler):
                 400, f"body: expected id, a number, and answer, a text of at most {ANSWER_CHARACTERS} characters"
             )
         own = Answer(_line(text), self._by(body))
-        first = self.server.site.questions.answer(number, own)
+        first = self.site.questions.answer(number, own)
         if first is None:
             return self._json(409, {"accepted": False, "by": ""})
         return self._json(200 if first is own else 409, {"accepted": first is own, "by": first.by})
 
     def _stop(self) -> None:
         body = self._body()
-        stop, hub = self.server.site.stop, self.server.site.hub
+        stop, hub = self.site.stop, self.site.hub
         if stop is None or hub.ended:
             raise Refused(409, "stop: there is nothing to stop here")
         stop(self._by(body))
@@ -168,7 +172,7 @@ class Handler(BaseHTTPRequestHandler):
         Raises:
             Refused: it is something else.
         """
-        gate.check_token(self.headers, self.server.site.token)
+        gate.check_token(self.headers, self.site.token)
         content = self.rfile.read(gate.body_length(self.headers))
         try:
             body = json.loads(content)
@@ -203,6 +207,7 @@ class Handler(BaseHTTPRequestHandler):
         self._write(content)
 
     def _head(self, status: int, content_type: str, length: int | None, policy: str, more: Mapping[str, str]) -> None:
+        self.request_version = self.protocol_version  # whatever was asked in: an answer has a head
         self.send_response(status)
         size = {} if length is None else {"Content-Length": str(length)}
         fields = {

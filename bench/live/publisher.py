@@ -5,16 +5,25 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from typing import Protocol
 
 from bench.live.buckets import Buckets
 from bench.live.hub import Hub
-from bench.recording.tap import Tap
+from bench.samples import SampleBlock
 
 logger = logging.getLogger("bench.live")
 PERIOD_S = 0.05
 OLD_NS = 300_000_000  # what was taken by nobody for so long is not shown any more
+
+
+class Source(Protocol):
+    """Where samples are taken, such as `bench.recording.tap.Tap`."""
+
+    def take(self, not_before_ns: int = 0) -> Mapping[str, Sequence[tuple[int, SampleBlock]]]:
+        """By stream what came since it was asked before, each block with the `time.monotonic_ns` at which it came."""
+        ...
 
 
 class Publisher:
@@ -22,10 +31,10 @@ class Publisher:
 
     def __init__(self, hub: Hub) -> None:
         self._hub = hub
-        self._watched: tuple[Tap, Buckets, bool] | None = None
+        self._watched: tuple[Source, Buckets, bool] | None = None
         self._end = threading.Event()
 
-    def watch(self, tap: Tap, buckets: Buckets, *, real_time: bool) -> None:
+    def watch(self, tap: Source, buckets: Buckets, *, real_time: bool) -> None:
         """Show the samples of a tap from now on. In real time their age counts from when the host heard them, else from when
         they came into the tap."""
         self._watched = tap, buckets, real_time

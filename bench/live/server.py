@@ -11,7 +11,8 @@ import socketserver
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from functools import partial
 from typing import Any
 
 from bench.errors import ConfigError
@@ -20,7 +21,6 @@ from bench.live.site import Site
 
 logger = logging.getLogger("bench.live")
 CLIENTS = 48  # at once
-READERS = 16  # of them, who follow the events
 DRAIN_S = 0.3  # at the end, for what was said last
 
 
@@ -38,12 +38,12 @@ class LiveServer(socketserver.ThreadingMixIn, socketserver.TCPServer):
 
     def __init__(self, site: Site, address: str, port: int) -> None:
         self.site = site
+        self._open: set[socket.socket] = set()
         self._places = threading.BoundedSemaphore(CLIENTS)
-        self.reader_places = threading.BoundedSemaphore(READERS)
         family, where = _resolved(address, port)
         self.address_family = family
         try:
-            super().__init__(where, Handler)
+            super().__init__(where, partial(Handler, site))
         except OSError as error:
             raise ConfigError(_why(error, address, port)) from error
 
@@ -61,9 +61,11 @@ class LiveServer(socketserver.ThreadingMixIn, socketserver.TCPServer):
         if not self._places.acquire(blocking=False):
             self.shutdown_request(request)
             return
+        self._open.add(request)
         try:
             super().process_request(request, client_address)
         except BaseException:
+            self._open.discard(request)
             self._places.release()
             raise
 
@@ -71,6 +73,7 @@ class LiveServer(socketserver.ThreadingMixIn, socketserver.TCPServer):
         try:
             super().process_request_thread(request, client_address)
         finally:
+            self._open.discard(request)
             self._places.release()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
@@ -90,6 +93,9 @@ class LiveServer(socketserver.ThreadingMixIn, socketserver.TCPServer):
             self.shutdown()
             self.server_close()
             thread.join()
+            for request in list(self._open):  # whoever is in the middle of something
+                with suppress(OSError):
+                    request.shutdown(socket.SHUT_RDWR)
 
     def _drained(self) -> None:
         """Let pages have what they have not had yet; one that takes nothing is not waited for."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import secrets
+import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,6 +12,8 @@ from bench.live.assets import Asset, page_assets
 from bench.live.gate import new_token
 from bench.live.hub import Hub
 from bench.live.questions import Questions
+
+READERS = 16  # pages that follow the events at once
 
 
 @dataclass
@@ -27,6 +30,7 @@ class Site:
     named: str = ""
     report: Path | None = None
     fetched: int = 0
+    places: threading.BoundedSemaphore = field(default_factory=lambda: threading.BoundedSemaphore(READERS))
 
     def url(self, address: str, port: int) -> str:
         """What a person opens; the token is in the fragment, which no browser sends anywhere."""

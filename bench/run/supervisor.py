@@ -5,8 +5,9 @@ Signals only set a flag while the machine moves; the clock's pump asks `check` a
 nothing moves (start-up, analysis) a signal raises at once.
 
 During make-safe nothing is raised: a second signal is logged and ignored, a first one waits until the machine is safe
-(`checkpoint`). A person at the live page stops a run the same way (`stop`). A step that takes too long, or whose link is dead, is logged and the next one still runs. What a step
-calls must not block outside of `clock.sleep`; links never do (`receive` never waits).
+(`checkpoint`). A person at the live page stops a run the same way (`stop`). A step that takes too long, or whose link is dead,
+is logged and the next one still runs. What a step calls must not block outside of `clock.sleep`; links never do (`receive`
+never waits).
 """
 
 from __future__ import annotations
@@ -75,8 +76,8 @@ class Supervisor:
         self._answer()
 
     def stop(self, who: str) -> None:
-        """Stop the run as a signal does, at the wish of a person, from any thread: at the next check while the machine moves, at
-        once where nothing does and signals are heard. Returns at once."""
+        """Stop the run as a signal does, at the wish of a person, from any thread: at the next check while the machine moves,
+        at once where nothing does and signals are heard. Returns at once."""
         if not self._noted(f"STOP ({who})", StopAsked):
             return
         with self._heard:
