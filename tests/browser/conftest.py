@@ -25,7 +25,9 @@ def chromium() -> Iterator[Any]:
     from playwright.sync_api import sync_playwright
 
     path = os.environ.get("CHROMIUM") or next((p for name in FOUND if (p := shutil.which(name))), None)
-    assert path is not None, f"browser: found none of {', '.join(FOUND)}. Next: install one, or set CHROMIUM to its path"
+    assert path is not None, (
+        f"browser: found none of {', '.join(FOUND)}. Next: install one, or set CHROMIUM to its path"
+    )
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
         yield browser

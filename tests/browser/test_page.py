@@ -20,7 +20,9 @@ INKED = """(canvas) => { const c = canvas.getContext("2d").getImageData(0, 0, ca
   return seen.size; }"""
 
 
-def test_it_asks_for_nothing_beyond_its_own_server_and_complains_of_nothing(standin: Standin, opened: Open, expect: Any) -> None:
+def test_it_asks_for_nothing_beyond_its_own_server_and_complains_of_nothing(
+    standin: Standin, opened: Open, expect: Any
+) -> None:
     made.begin(standin.run)
     page = opened(standin.address)
     expect(page.page.locator("#state")).to_have_text("LEVITATED")
@@ -39,7 +41,9 @@ def test_the_token_leaves_the_address_and_a_reload_finds_it(standin: Standin, op
     assert not any(made.TOKEN in url for url in page.asked)
 
 
-def test_a_wrong_token_is_said_and_the_right_one_in_the_same_tab_taken(standin: Standin, opened: Open, expect: Any) -> None:
+def test_a_wrong_token_is_said_and_the_right_one_in_the_same_tab_taken(
+    standin: Standin, opened: Open, expect: Any
+) -> None:
     made.begin(standin.run)
     page = opened(standin.address.replace(made.TOKEN, "another"))
     expect(page.page.locator("#link")).to_contain_text("Open the address that the run printed")
@@ -149,7 +153,9 @@ def test_stop_is_sent_once_with_who_and_says_what_happens(standin: Standin, open
     expect(page.page.locator("#stopbar")).to_be_hidden()
 
 
-def test_a_stop_that_does_not_get_through_says_so_and_can_be_pressed_again(standin: Standin, opened: Open, expect: Any) -> None:
+def test_a_stop_that_does_not_get_through_says_so_and_can_be_pressed_again(
+    standin: Standin, opened: Open, expect: Any
+) -> None:
     made.begin(standin.run)
     page = opened(standin.address)
     expect(page.page.locator("#state")).to_have_text("LEVITATED")
@@ -186,7 +192,9 @@ def test_a_lost_connection_is_grey_and_said_and_comes_back(standin: Standin, ope
     expect(page.page.locator("#stopsays")).to_contain_text("no emergency stop")
 
 
-def test_plots_that_stand_still_are_said_to_be_old_while_the_connection_stands(standin: Standin, opened: Open, expect: Any) -> None:
+def test_plots_that_stand_still_are_said_to_be_old_while_the_connection_stands(
+    standin: Standin, opened: Open, expect: Any
+) -> None:
     made.begin(standin.run)
     page = opened(standin.address)
     expect(page.page.locator("#state")).to_have_text("LEVITATED")
@@ -201,7 +209,9 @@ def test_findings_stand_by_effect_and_the_log_in_order(standin: Standin, opened:
     for finding in made.FINDINGS:
         standin.run.tell("finding", finding)
     page = opened(standin.address)
-    expect(page.page.locator(".finding code")).to_have_text(["stuck-channel", "load-not-still", "calibration-due", "missing-samples"])
+    expect(page.page.locator(".finding code")).to_have_text(
+        ["stuck-channel", "load-not-still", "calibration-due", "missing-samples"]
+    )
     expect(page.page.locator("#loglist li")).to_have_text(list(made.LOG))
 
 
@@ -233,7 +243,10 @@ def test_text_of_the_run_is_text(standin: Standin, opened: Open, expect: Any) ->
     run.tell("progress", {**made.PROGRESS, "stage": HOSTILE, "step": HOSTILE})
     run.tell("log", {"text": HOSTILE})
     run.tell("finding", {"code": HOSTILE, "text": HOSTILE, "where": HOSTILE, "effect": HOSTILE})
-    run.tell("prompt", {**made.PROMPT, "question": HOSTILE, "hint": HOSTILE, "choices": [{"label": HOSTILE, "answer": HOSTILE}]})
+    run.tell(
+        "prompt",
+        {**made.PROMPT, "question": HOSTILE, "hint": HOSTILE, "choices": [{"label": HOSTILE, "answer": HOSTILE}]},
+    )
     page = opened(standin.address)
     expect(page.page.locator("#question")).to_have_text(HOSTILE)
     run.tell("answered", {"id": 1, "answer": HOSTILE, "by": HOSTILE})

@@ -25,7 +25,9 @@ def alone() -> Iterator[None]:
         yield
 
 
-def test_a_person_at_the_page_answers_and_stops_a_served_run(tmp_path: Path, alone: None, opened: Open, expect: Any) -> None:
+def test_a_person_at_the_page_answers_and_stops_a_served_run(
+    tmp_path: Path, alone: None, opened: Open, expect: Any
+) -> None:
     with (
         real.served("tsbs12") as links,
         real.run(tmp_path, "amb-calibration", "--rig", "tsbs12", "--operator", "console", *links) as run,
