@@ -33,8 +33,8 @@ class Run:
                 break
         assert found is not None, "".join(self.said)
         self.address = found[1]
-        self._reader = threading.Thread(target=self._read, args=(process.stderr,))
-        self._reader.start()
+        self.reader = threading.Thread(target=self._read, args=(process.stderr,))
+        self.reader.start()
 
     def _read(self, stream: IO[str]) -> None:
         self.said += stream
@@ -42,7 +42,7 @@ class Run:
     def end(self) -> tuple[int, dict[str, Any]]:
         """Exit status and record."""
         status = self.process.wait(END_S)
-        self._reader.join(END_S)
+        self.reader.join(END_S)
         assert self.process.stdout is not None
         folder = Path(self.process.stdout.read().splitlines()[-1])
         return status, json.loads((folder / "record.json").read_text(encoding="utf-8")) | {"folder": folder}
@@ -58,10 +58,14 @@ def run(out: Path, *words: str) -> Iterator[Run]:
     command = [*BENCH, "run", *words, "--live", "--out", str(out)]
     with subprocess.Popen(command, cwd=out, env=_environment(), text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
                           stderr=subprocess.PIPE) as process:  # fmt: skip
+        found = None
         try:
-            yield Run(process)
+            found = Run(process)
+            yield found
         finally:
             process.terminate()
+            if found is not None:
+                found.reader.join(END_S)
 
 
 @contextmanager

@@ -5,7 +5,7 @@ import { bandOf } from "./buffers.js";
 import { clock, decimalsOf, fixed, shownIn } from "./text.js";
 
 const MOST_LINES = 4; // in one plot; more are unreadable
-const POINTS = 600;
+const POINTS = 400;
 const HEIGHT = 190;
 export const ALL = "All";
 const REST = "Machine";
