@@ -9,8 +9,8 @@ from contextlib import suppress
 from bench import runlog
 from bench.cli import live, reporting
 from bench.cli.compose import Request, prepare
-from bench.cli.loading import load_procedure
 from bench.cli.live import LivePage, PageRequest
+from bench.cli.loading import load_procedure
 from bench.cli.summary import summary
 from bench.errors import ConfigError
 from bench.progress import shown_on

@@ -124,7 +124,7 @@ def evaluate(
         limits = by_names(recording.rig.aliases, limits)
     if stopped or recording is None:
         before = () if recording is None else continued.continued_runs(recording)
-        return Evaluation(_in_order(procedure, {}, limits), Correlations((), ()), (), before)
+        return Evaluation(_in_order(procedure, {}, limits), Correlations((), ()), (), continues=before)
     left_out = [q.name for q in quantities_on(recording.rig.aliases, procedure.left_out(recording.plan))]
     stated, (limits, notes) = limits, applied(limits, recording.plan, left_out)
     limits, mistaken = in_unit(limits, (*procedure.measures, *procedure.kinds))
