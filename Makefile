@@ -9,7 +9,7 @@ READY := .venv/.ready
 # Tests start hundreds of processes: without its bytecode every one of them would compile the project again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test check format ci-long faults links browser pictures fuzz campaigns plants sound moved golden former bench clean lock setup wheel
+.PHONY: demo test check format ci-long faults links browser pictures fuzz campaigns plants sound moved golden former bench clean lock setup wheel site gallery
 
 demo: setup
 	$(BIN)/bench run amb-calibration --rig tsbs12 --seed 1
@@ -113,6 +113,22 @@ $(TOOLS)/.ready: install/wheel-tools.txt
 	$(PYTHON) -m venv $(TOOLS)
 	$(TOOLS)/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r install/wheel-tools.txt
 	@touch $@
+
+# The documentation as a site, in build/site; with the reports of the campaigns of `make gallery`, if it was made.
+SITE_TOOLS := build/site-tools
+site: $(SITE_TOOLS)/.ready
+	$(PYTHON) docs/site/collect_pages.py build/pages $(wildcard runs/gallery/*.campaign-*)
+	$(SITE_TOOLS)/bin/zensical build --clean --strict --config-file mkdocs.yml
+
+$(SITE_TOOLS)/.ready: docs/site/tools.txt
+	$(PYTHON) -m venv $(SITE_TOOLS)
+	$(SITE_TOOLS)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps -r docs/site/tools.txt
+	@touch $@
+
+GALLERY := tsbs-identification amb-motion
+gallery: setup
+	for name in $(GALLERY); do \
+	    $(BIN)/bench campaign $$name --seed 1 --short --go-on --out runs/gallery || test $$? -ne 2 || exit 2; done
 
 format: setup
 	$(BIN)/ruff format .

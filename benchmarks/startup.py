@@ -1,5 +1,6 @@
-"""Start-up time of `bench --help` and `bench list`, limit 0.7 s, and processor time of `bench list --rig` for every rig file of
-`rigs/` and `examples/`, limit 0.5 s: best of five fresh processes each.
+"""Start-up time of `bench --help` and `bench list`, limit 0.7 s; processor time of `bench list --rig` for every rig file of
+`rigs/` and `examples/`, limit 0.5 s; of `import bench`, and of what `bench` takes to see whose its packages are in the
+environment of this Python, limit 0.05 s beyond an empty Python: best of five fresh processes each.
 
 The best, because a busy machine only ever adds. Exit status 1 when over the limit. With bytecode, as an installed bench has it.
 """
@@ -9,12 +10,13 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import sysconfig
 import time
 from pathlib import Path
 
 from bench import catalogue
 
-LIMIT_S, PROCESSOR_S = 0.7, 0.5
+LIMIT_S, PROCESSOR_S, IMPORT_S = 0.7, 0.5, 0.05
 REPEATS = 5
 ENVIRONMENT = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
 
@@ -32,12 +34,10 @@ def best(*arguments: str) -> float:
 
 
 def best_processor(*arguments: str) -> float:
-    """Seconds of processor time of one command, user and system, the best of the repeats."""
+    """Seconds of processor time of Python with these arguments, user and system, the best of the repeats."""
     times = []
     for _ in range(REPEATS):
-        child = subprocess.Popen(
-            [sys.executable, "-m", "bench.cli", *arguments], stdout=subprocess.DEVNULL, env=ENVIRONMENT
-        )
+        child = subprocess.Popen([sys.executable, *arguments], stdout=subprocess.DEVNULL, env=ENVIRONMENT)
         _, status, usage = os.wait4(child.pid, 0)
         child.returncode = os.waitstatus_to_exitcode(status)
         if child.returncode:
@@ -56,9 +56,15 @@ def main() -> int:
         *(entry.name for entry in catalogue.rigs()),
         *sorted(str(p) for p in Path("examples").glob("*/*.toml")),
     ):
-        seconds = best_processor("list", "--rig", rig)
+        seconds = best_processor("-m", "bench.cli", "list", "--rig", rig)
         slow |= seconds > PROCESSOR_S
         print(f"bench list --rig {rig:38} {seconds:6.3f} s of processor time   limit {PROCESSOR_S} s")
+    empty, packages = best_processor("-c", "pass"), sysconfig.get_paths()["purelib"]
+    owners = f"import levbench; list(levbench._owners({packages!r}))"
+    for what, code in (("import bench", "import bench"), ("whose the packages are", owners)):
+        seconds = best_processor("-c", code) - empty
+        slow |= seconds > IMPORT_S
+        print(f"{what:55} {seconds:6.3f} s of processor time   limit {IMPORT_S} s")
     return int(slow)
 
 
