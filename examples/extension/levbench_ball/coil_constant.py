@@ -44,7 +44,7 @@ class Plan(BenchPlan):
     span_m: float = Field(6e-4, gt=0)  # heights lie between - and + this
     heights: int = Field(11, ge=6)
     settle_s: float = Field(0.8, gt=0)
-    average_s: float = Field(0.3, ge=0.1)
+    average_s: float = Field(0.6, ge=0.1)
 
     def places(self) -> Array:
         """The heights (heights,), m: up and down by turns, so that a drift makes no slope."""
