@@ -168,7 +168,7 @@ def _as_installed(folder: Path) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(900)
 def test_guides_that_add_to_the_tree_work(tmp_path: Path) -> None:
     """One after the other, each going on from what the one before has left, with the scratch copy in front of the clone."""
     for part in COPIED:

@@ -235,6 +235,7 @@ def test_a_link_of_a_package_is_opened(bench: Bench, site: Path) -> None:
     assert status == 2
     assert "found scheme 'boxed'" in err
     install(site, "lev-box", {"levbench.links": {"boxed": "lev_box:BOXED"}}, {"lev_box": LINK})
+    extensions._read.cache_clear()  # metadata are read once in a process
     path = on_link("boxed:127.0.0.1:2")
     assert bench("check", str(path), "amb-calibration")[0] == 0
     assert "lev_box" not in sys.modules
