@@ -162,4 +162,5 @@ procedure = Procedure(
     check=check,
     step_count=lambda plan: plan.heights,
     method=read_method(__file__),
+    reached=("machine/own_saturation",),
 )
