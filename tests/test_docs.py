@@ -17,6 +17,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import tomllib
 from dataclasses import dataclass, field
 from itertools import takewhile
 from pathlib import Path
@@ -32,7 +33,7 @@ from bench.procedure import plans
 from bench.rigfile import load_rig
 
 ROOT = Path(__file__).parent.parent
-TREE = ("add-a-procedure", "add-a-machine")
+TREE = ("add-a-procedure", "add-a-machine", "add-a-package")
 """Guides that add to the tree itself, in the order in which they are executed, in one scratch copy of it."""
 PAGES = sorted(
     p for p in (ROOT / "docs").rglob("*.md") if "```console" in p.read_text(encoding="utf-8") and p.stem not in TREE
@@ -154,13 +155,26 @@ def tree_lines(page: Path) -> list[str]:
     return lines
 
 
+def _as_installed(folder: Path) -> None:
+    """The entry points of the copy, as an installation of it would leave them."""
+    info = folder / "levbench-0.0.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: levbench\nVersion: 0.0.0\n")
+    groups = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["entry-points"]
+    lines = [
+        line for group, named in groups.items() for line in (f"[{group}]", *(f"{k} = {v}" for k, v in named.items()))
+    ]
+    (info / "entry_points.txt").write_text("\n".join(lines) + "\n")
+
+
 @pytest.mark.long
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(900)
 def test_guides_that_add_to_the_tree_work(tmp_path: Path) -> None:
     """One after the other, each going on from what the one before has left, with the scratch copy in front of the clone."""
     for part in COPIED:
         copy = shutil.copytree if (ROOT / part).is_dir() else shutil.copy2
         copy(ROOT / part, tmp_path / part)
+    _as_installed(tmp_path)
     for name in TREE:
         shell(tree_lines(ROOT / f"docs/how-to/{name}.md"), tmp_path, PYTHONPATH=str(tmp_path))
 

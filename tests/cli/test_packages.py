@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import socket
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -203,3 +204,65 @@ def test_a_machine_of_a_package_is_simulated(site: Path) -> None:
     assert machine.name == "mine"
     with pytest.raises(ConfigError, match=r"expected one of .*twin, mine"):
         machine_of(rig.model_copy(update={"simulation": {**rig.simulation, "machine": "mime"}}))
+
+
+LINK = """
+from bench.rigfile import linkurl
+from drivers.wires import LinkKind, open_wire
+
+
+def open_it(spec, name, identifiers, now_ns):
+    inner = linkurl.parse(spec.url).rest
+    return open_wire(spec.model_copy(update={"url": f"serial:socket://{inner}"}), name, identifiers, now_ns)
+
+
+BOXED = LinkKind(open_it)
+"""
+
+
+def on_link(url: str) -> Path:
+    """A rig file in the folder, its controller on another link."""
+    rig = load_rig("tsbs12")
+    Path("tsbs12.dbc").write_text(rig.dbc_text)
+    Path("mine.toml").write_text(rig.toml_text.replace("slcan:socket://127.0.0.1:28501", url, 1))
+    return Path("mine.toml")
+
+
+def test_a_link_of_a_package_is_opened(bench: Bench, site: Path) -> None:
+    from drivers.wires import PacketWire, open_wire
+
+    status, _, err = bench("check", str(on_link("boxed:127.0.0.1:1")))
+    assert status == 2
+    assert "found scheme 'boxed'" in err
+    install(site, "lev-box", {"levbench.links": {"boxed": "lev_box:BOXED"}}, {"lev_box": LINK})
+    extensions._read.cache_clear()  # metadata are read once in a process
+    path = on_link("boxed:127.0.0.1:2")
+    assert bench("check", str(path), "amb-calibration")[0] == 0
+    assert "lev_box" not in sys.modules
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        spec = load_rig(str(path)).link
+        wire = open_wire(spec.model_copy(update={"url": f"boxed:127.0.0.1:{server.getsockname()[1]}"}), "controller")
+        assert isinstance(wire, PacketWire)
+        wire.close()
+
+
+@pytest.mark.parametrize(
+    ("scheme", "text", "expected"),
+    [("slcan", LINK, "link 'slcan' is taken twice: found levbench (bench.rigfile.linkurl) and lev-box 1.2 (lev_box:BOXED)"),
+     ("boxed", "1 / 0", "link 'boxed' of lev-box 1.2 (lev_box:BOXED) cannot be loaded: ZeroDivisionError in lev_box.py:1"),
+     ("boxed", "BOXED = open", "found a builtin_function_or_method; expected a drivers.wires.LinkKind")],
+)  # fmt: skip
+def test_a_link_of_a_package_that_cannot_be(bench: Bench, site: Path, scheme: str, text: str, expected: str) -> None:
+    install(site, "lev-box", {"levbench.links": {scheme: "lev_box:BOXED"}}, {"lev_box": text})
+    path = on_link(f"{scheme}:socket://127.0.0.1:1")
+    status, _, err = bench("run", "amb-calibration", "--rig", str(path), "--backend", "live", "--operator", "auto")
+    assert status == 2
+    assert expected in err
+
+
+def test_a_device_of_a_package_that_has_a_scheme_of_ours(bench: Bench, site: Path) -> None:
+    from drivers.modbus import open_lines
+
+    install(site, "lev-bus", {"levbench.devices": {"modbus-tcp": "lev_bus:BUS"}}, {})
+    with pytest.raises(ConfigError, match="device 'modbus-tcp' is taken twice"), open_lines(load_rig("tsbs12")):
+        pass
