@@ -89,12 +89,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--procedure", default="amb-calibration")
     parser.add_argument("--rig", default="tsbs12")
+    parser.add_argument("--repeats", type=int, default=REPEATS)
     asked = parser.parse_args()
     request = Request(procedure=asked.procedure, rig=asked.rig)
     times: dict[str, list[float]] = {name: [] for name in CASES}
     with tempfile.TemporaryDirectory() as folder:
         seconds(request, None, Path(folder))  # what is loaded once
-        for _ in range(REPEATS):
+        for _ in range(asked.repeats):
             for name, look in CASES.items():
                 times[name].append(seconds(request, look, Path(folder)))
     alone = min(times["no page"])

@@ -149,9 +149,9 @@ def test_the_page_says_nothing_of_the_run_without_the_token(shared: MadeRun, cli
 
 
 def test_a_page_that_comes_late_is_told_what_stands(made: MadeRun, own: Client) -> None:
-    made.hello()
     made.hub.tell("finding", {"id": "a", "text": "3 samples"}, "a")
     made.hub.tell("log", {"text": "first line"})
+    made.hello()
     for done in range(100):
         made.hub.tell("progress", {"done": done})
     made.hub.tell("finding", {"id": "a", "text": "17 samples"}, "a")
