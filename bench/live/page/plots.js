@@ -7,6 +7,7 @@ import { clock, decimalsOf, fixed, shownIn } from "./text.js";
 const MOST_LINES = 4; // in one plot; more are unreadable
 const POINTS = 400;
 const HEIGHT = 190;
+const READ_MS = 200; // numbers that change faster cannot be read
 export const ALL = "All";
 const REST = "Machine";
 const KINDS = { position: "positions", current: "currents", speed: "speed", temperature: "temperatures", supply: "supply" };
@@ -157,7 +158,9 @@ export function plotOf(panel, palette) {
   const plot = { node, group: panel.group, visible: false };
   let chart = null;
   let latest = {};
+  let labelled = 0;
   const label = () => {
+    labelled = performance.now();
     const decimals = chart ? decimalsOf(chart.scales.y.max - chart.scales.y.min) : 3;
     const at = chart?.cursor.idx;
     panel.channels.forEach(({ name, shown }, k) => {
@@ -172,14 +175,14 @@ export function plotOf(panel, palette) {
     latest = last;
     const view = history.view(seconds, Math.min(POINTS, Math.max(100, frame.clientWidth)), end);
     const data = [view.x, ...panel.channels.flatMap(({ name, shown }) => bandOf(view, name, shown).reverse())];
-    chart ??= new uPlot(optionsOf(panel, palette, frame.clientWidth, { draw: [drawLimits(panel, palette)], setCursor: [label] }), data, frame);
+    chart ??= new uPlot(optionsOf(panel, palette, frame.clientWidth, { draw: [drawLimits(panel, palette)], setCursor: [() => label()] }), data, frame);
     if (chart.width !== frame.clientWidth && frame.clientWidth > 0) chart.setSize({ width: frame.clientWidth, height: HEIGHT });
     chart.batch(() => {
       chart.setData(data, false);
       const from = Math.max(0, end - seconds); // a run begins at 0 and fills the picture from its left
       chart.setScale("x", { min: from, max: from + seconds });
     });
-    label();
+    if (performance.now() - labelled >= READ_MS) label();
   };
   plot.redraw = () => chart?.redraw(false);
   plot.remove = () => { chart?.destroy(); node.remove(); };
