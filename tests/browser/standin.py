@@ -174,7 +174,7 @@ class Handler(BaseHTTPRequestHandler):
         body = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
         run = self.server.run
         if self.headers.get("X-Levbench-Token") != TOKEN or run.refuses:
-            self._send(run.refuses or 403, b'{"error": "refused"}', "application/json")
+            self._send(run.refuses or 403, b"refused: by the test", "text/plain")
         elif self.path == "/stop":
             run.stops.append(body)
             self._send(202, b"{}", "application/json")
@@ -198,7 +198,7 @@ class Handler(BaseHTTPRequestHandler):
     def _events(self) -> None:
         run = self.server.run
         if self.headers.get("X-Levbench-Token") != TOKEN or run.refuses:
-            self._send(run.refuses or 403, b'{"error": "the token is missing or another run\'s"}', "application/json")
+            self._send(run.refuses or 403, b"the token is missing or another run's", "text/plain")
             return
         while run.holds and not run.ending:
             time.sleep(0.05)

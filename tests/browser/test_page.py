@@ -13,7 +13,8 @@ from standin import Standin
 
 Open = Callable[..., Any]
 COUNTED = """
-window.drawn = []; document.addEventListener("drawn", (e) => window.drawn.push([performance.now(), e.detail.age_ms]));
+window.drawn = []; document.addEventListener("drawn",
+  ({ detail }) => window.drawn.push([performance.now(), Date.now() - detail.sent_ms + detail.age_ms]));
 """
 INKED = """(canvas) => { const c = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
   const seen = new Set();

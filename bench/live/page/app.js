@@ -52,7 +52,7 @@ const heard = {
     pictures.take(block, float32);
     newest.t_s = pictures.newestTime();
     newest.told = { state: block.state, fault: block.fault, speed_rpm: block.speed_rpm, t_s: newest.t_s };
-    pictures.draw(newest.lost, () => document.dispatchEvent(new CustomEvent("drawn", { detail: { age_ms: age(), sent_ms: block.sent_ms } })));
+    pictures.draw(newest.lost, () => document.dispatchEvent(new CustomEvent("drawn", { detail: { sent_ms: block.sent_ms, age_ms: block.age_ms } })));
   },
   progress: showProgress,
   finding: findings.add,

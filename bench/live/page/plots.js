@@ -146,6 +146,17 @@ function legendOf(panel) {
   return { list, values };
 }
 
+/** The values of a plot's channels: under the cursor, from least to greatest, else the newest. */
+function write(panel, values, chart, latest) {
+  const decimals = decimalsOf(chart.scales.y.max - chart.scales.y.min);
+  const at = chart.cursor.idx;
+  panel.channels.forEach(({ name, shown }, k) => {
+    const [high, low] = typeof at === "number" ? [chart.data[2 * k + 1][at], chart.data[2 * k + 2][at]] : [];
+    const last = typeof latest[name] === "number" ? (latest[name] - shown.offset) / shown.factor : null;
+    values[k].textContent = typeof low === "number" ? `${fixed(low, decimals)} … ${fixed(high, decimals)}` : fixed(last, decimals);
+  });
+}
+
 /** One plot in the document: {node, show(history, window, end, last), visible, group, remove()}. */
 export function plotOf(panel, palette) {
   const node = document.createElement("figure");
@@ -159,30 +170,22 @@ export function plotOf(panel, palette) {
   let chart = null;
   let latest = {};
   let labelled = 0;
-  const label = () => {
+  const label = (u) => {
     labelled = performance.now();
-    const decimals = chart ? decimalsOf(chart.scales.y.max - chart.scales.y.min) : 3;
-    const at = chart?.cursor.idx;
-    panel.channels.forEach(({ name, shown }, k) => {
-      const under = typeof at === "number" && chart.data[2 * k + 1]?.[at];
-      const low = typeof under === "number" ? chart.data[2 * k + 2][at] : null;
-      const last = latest[name];
-      const now = typeof last === "number" ? (last - shown.offset) / shown.factor : null;
-      values[k].textContent = low === null ? fixed(now, decimals) : `${fixed(low, decimals)} … ${fixed(under, decimals)}`;
-    });
+    write(panel, values, u, latest);
   };
   plot.show = (history, seconds, end, last) => {
     latest = last;
     const view = history.view(seconds, Math.min(POINTS, Math.max(100, frame.clientWidth)), end);
     const data = [view.x, ...panel.channels.flatMap(({ name, shown }) => bandOf(view, name, shown).reverse())];
-    chart ??= new uPlot(optionsOf(panel, palette, frame.clientWidth, { draw: [drawLimits(panel, palette)], setCursor: [() => label()] }), data, frame);
+    chart ??= new uPlot(optionsOf(panel, palette, frame.clientWidth, { draw: [drawLimits(panel, palette)], setCursor: [label] }), data, frame);
     if (chart.width !== frame.clientWidth && frame.clientWidth > 0) chart.setSize({ width: frame.clientWidth, height: HEIGHT });
     chart.batch(() => {
       chart.setData(data, false);
       const from = Math.max(0, end - seconds); // a run begins at 0 and fills the picture from its left
       chart.setScale("x", { min: from, max: from + seconds });
     });
-    if (performance.now() - labelled >= READ_MS) label();
+    if (performance.now() - labelled >= READ_MS) label(chart);
   };
   plot.redraw = () => chart?.redraw(false);
   plot.remove = () => { chart?.destroy(); node.remove(); };
