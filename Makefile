@@ -9,7 +9,7 @@ READY := .venv/.ready
 # Tests start hundreds of processes: without its bytecode every one of them would compile the project again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test check format ci-long faults links browser fuzz campaigns plants sound moved golden former bench clean lock setup
+.PHONY: demo test check format ci-long faults links browser pictures fuzz campaigns plants sound moved golden former bench clean lock setup
 
 demo: setup
 	$(BIN)/bench run amb-calibration --rig tsbs12 --seed 1
@@ -34,11 +34,16 @@ faults: setup
 links: setup
 	$(BIN)/python -m pytest -q -m links tests/links
 
-# The live page in Chromium, which has to be installed (Debian: apt-get install chromium), or CHROMIUM=/path/to/it. It makes the
-# README's pictures anew.
+# The live page in Chromium, which has to be installed (Debian: apt-get install chromium), or CHROMIUM=/path/to/it.
+# Pictures of every state to look at lie under build/browser then.
 browser: setup
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check "playwright>=1.55"
 	$(BIN)/python -m pytest -q -m browser tests/browser
+
+# The README's pictures anew, by the same tests.
+pictures: setup
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check "playwright>=1.55"
+	PICTURES=docs/pictures $(BIN)/python -m pytest -q -m browser tests/browser/test_pictures.py
 
 fuzz: setup
 	$(BIN)/python -m pytest -q -m "hypothesis and not long and not browser" -n 2 --hypothesis-profile=search --timeout 600

@@ -53,7 +53,7 @@ LONG = (
     "change-a-plan", "coast-down", "compensation", "connect-a-rig", "first-calibration", "force-constant",
     "force-coupling", "force-map", "inject-faults", "lift-off", "maximum-speed", "model", "negative-stiffness",
     "run-a-campaign", "run-up", "sensitivity", "slew", "spindown", "step", "torque-constant", "tracking", "unbalance",
-    "use-in-ci",
+    "use-in-ci", "watch-a-run",
 )  # fmt: skip
 """Pages that take long, or that only run a procedure: by default `tests/procedures` takes each through its whole path and
 draws its figures, and `tests/cli` the same commands with their reports and calibrations."""

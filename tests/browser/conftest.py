@@ -1,4 +1,5 @@
-"""A browser for these tests, which `make browser` runs: Chromium, without a window. CHROMIUM names another one than the first that is found."""
+"""A browser for these tests, which `make browser` runs: Chromium, without a window. CHROMIUM is its path where it is not found
+by itself."""
 
 from __future__ import annotations
 
@@ -11,6 +12,7 @@ from typing import Any
 import pytest
 from standin import Standin
 
+FIGURES: list[str] = []
 FOUND = ("chromium", "chromium-browser", "google-chrome")
 
 
@@ -20,12 +22,25 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.browser)
 
 
+def pytest_terminal_summary(terminalreporter: Any) -> None:
+    for line in FIGURES:
+        terminalreporter.write_line(line)
+
+
+@pytest.fixture
+def figure() -> Callable[[str], None]:
+    """Says what was measured at the end of the session; nothing is decided by it."""
+    return FIGURES.append
+
+
 @pytest.fixture(scope="session")
 def chromium() -> Iterator[Any]:
     from playwright.sync_api import sync_playwright
 
     path = os.environ.get("CHROMIUM") or next((p for name in FOUND if (p := shutil.which(name))), None)
-    assert path is not None, f"browser: found none of {', '.join(FOUND)}. Next: install one, or set CHROMIUM to its path"
+    assert path is not None, (
+        f"browser: found none of {', '.join(FOUND)}. Next: install one, or set CHROMIUM to its path"
+    )
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
         yield browser

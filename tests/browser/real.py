@@ -33,8 +33,8 @@ class Run:
                 break
         assert found is not None, "".join(self.said)
         self.address = found[1]
-        self._reader = threading.Thread(target=self._read, args=(process.stderr,))
-        self._reader.start()
+        self.reader = threading.Thread(target=self._read, args=(process.stderr,))
+        self.reader.start()
 
     def _read(self, stream: IO[str]) -> None:
         self.said += stream
@@ -42,7 +42,7 @@ class Run:
     def end(self) -> tuple[int, dict[str, Any]]:
         """Exit status and record."""
         status = self.process.wait(END_S)
-        self._reader.join(END_S)
+        self.reader.join(END_S)
         assert self.process.stdout is not None
         folder = Path(self.process.stdout.read().splitlines()[-1])
         return status, json.loads((folder / "record.json").read_text(encoding="utf-8")) | {"folder": folder}
@@ -58,17 +58,23 @@ def run(out: Path, *words: str) -> Iterator[Run]:
     command = [*BENCH, "run", *words, "--live", "--out", str(out)]
     with subprocess.Popen(command, cwd=out, env=_environment(), text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
                           stderr=subprocess.PIPE) as process:  # fmt: skip
+        found = None
         try:
-            yield Run(process)
+            found = Run(process)
+            yield found
         finally:
             process.terminate()
+            if found is not None:
+                found.reader.join(END_S)
 
 
 @contextmanager
 def served(rig: str, links: Sequence[str] = PORTS) -> Iterator[list[str]]:
     """The words that connect a run to a rig that is served in real time."""
     command = [*BENCH, "serve", rig, *(word for link in links for word in ("--link", link))]
-    with subprocess.Popen(command, env=_environment(), text=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
+    with subprocess.Popen(
+        command, env=_environment(), text=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+    ) as process:
         try:
             assert process.stdout is not None
             asked = [link.partition(":")[0] for link in links]  # link and scheme

@@ -136,20 +136,29 @@ def test_results_are_rounded_as_in_reports(modules: Any) -> None:
     rng = np.random.default_rng(1)
     U = 10 ** rng.uniform(-4.5, 5, 300)
     values = U * 10 ** rng.uniform(-1, 3, 300) * rng.choice([-1, 1], 300)
-    found = modules.evaluate("(pairs) => pairs.map(([v, u]) => withUncertainty(v, u))", np.transpose([values, U]).tolist())
+    found = modules.evaluate(
+        "(pairs) => pairs.map(([v, u]) => withUncertainty(v, u))", np.transpose([values, U]).tolist()
+    )
     compared = 0
     for value, u, told in zip(values, U, found, strict=True):
         (number,), width, shift = rounded_together([value], u)
         if shift == 0:  # reports take powers of ten out, also of large numbers
-            assert told == [number.replace("\u202f", "").replace("\u2009", ""), width.replace("\u202f", "").replace("\u2009", "")]
+            assert told == [
+                number.replace("\u202f", "").replace("\u2009", ""),
+                width.replace("\u202f", "").replace("\u2009", ""),
+            ]
             compared += 1
     assert compared > 150
     assert modules.evaluate("withUncertainty(-7.0042e-9, 2.1e-11)") == ["−7.004·10⁻⁹", "0.021·10⁻⁹"]
     assert modules.evaluate("withUncertainty(null, 1)") == ["–", "–"]
 
 
-@pytest.mark.parametrize(("x", "zoom", "half"), [([1e-5], False, 250e-6), ([3e-4], False, 3e-4), ([1e-5], True, 1e-5), ([], True, 1e-7)])
-def test_an_orbit_fits_with_its_ring_or_fills_the_picture(modules: Any, x: list[float], zoom: bool, half: float) -> None:
+@pytest.mark.parametrize(
+    ("x", "zoom", "half"), [([1e-5], False, 250e-6), ([3e-4], False, 3e-4), ([1e-5], True, 1e-5), ([], True, 1e-7)]
+)
+def test_an_orbit_fits_with_its_ring_or_fills_the_picture(
+    modules: Any, x: list[float], zoom: bool, half: float
+) -> None:
     orbit = {"clearance_m": 250e-6, "zones": [{"name": "A/B", "radius_m": 75e-6}]}
     found = modules.evaluate("([orbit, x, zoom]) => scaleOf(orbit, x, x, zoom)", [orbit, x, zoom])
     assert found["half"] == pytest.approx(1.12 * half)
