@@ -19,7 +19,8 @@ CERTIFICATES: Mapping[str, Below] = {
     "m": (("um", 1e-4), ("mm", 1.0)), "kg": (("mg", 1e-4), ("g", 1e-2)), "rad": (("deg", math.inf),),
 }  # fmt: skip
 CHANNELS: Mapping[str, Below] = {
-    "m": (("um", 1e-3), ("mm", math.inf)), "rad/s": (("r/min", math.inf),), "rad": (("deg", math.inf),), "K": (("degC", math.inf),),
+    "m": (("um", 1e-3), ("mm", math.inf)), "rad/s": (("r/min", math.inf),), "rad": (("deg", math.inf),),
+    "K": (("degC", math.inf),),
 }  # fmt: skip
 SETTINGS: tuple[tuple[str, str, Below], ...] = (
     ("_rad_s", "rad/s", (("_rpm", math.inf),)), ("_rad", "rad", (("_mrad", 0.02), ("_deg", math.inf))),
@@ -46,7 +47,7 @@ def of_certificate(si: str, size: float) -> tuple[str, float]:
 
 
 def of_channel(si: str, size: float) -> tuple[str, float, float]:
-    """Symbol of the unit in which a channel of about `size` is shown while it is measured, SI of one of it, and SI of its zero."""
+    """Symbol of the unit in which a channel of about `size` is shown live, what one of it is in SI, and SI of its zero."""
     symbol, _ = _chosen(si, size, CHANNELS)
     told = units.unit(symbol)
     return symbol, told.factor, told.offset

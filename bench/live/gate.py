@@ -62,7 +62,8 @@ def _bracketed(address: str) -> str:
         found = ipaddress.ip_address(address.partition("%")[0])
     except ValueError:
         return ""
-    return f"[{found}]" if found.version == 6 else str(found)
+    plain = found.ipv4_mapped if isinstance(found, ipaddress.IPv6Address) else found
+    return f"[{found}]" if plain is None else str(plain)
 
 
 def check_origin(headers: Headers, host: str) -> None:

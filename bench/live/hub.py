@@ -34,7 +34,6 @@ class Hub:
         self._newest: dict[tuple[str, str], tuple[int, bytes]] = {}
         self._last: dict[str, deque[tuple[int, bytes]]] = {kind: deque(maxlen=n) for kind, n in KEPT.items()}
         self._waiting = self._readers = 0
-        self._behind: dict[int, int] = {}  # by reader: how far it has been told
         self.closed = False
 
     def tell(self, kind: str, data: Mapping[str, Any] | None, key: str = "") -> None:
@@ -82,32 +81,22 @@ class Hub:
         """Whether the end stands."""
         return END in self._newest
 
-    @property
-    def all_told(self) -> bool:
-        """Whether every reader has been sent the end, if there is one."""
-        with self._changed:
-            end = self._newest.get(END, (0, b""))[0]
-            return all(place >= end for place in self._behind.values())
-
     @contextmanager
     def reading(self) -> Iterator[Reader]:
         """A place among the readers."""
         reader = Reader(self)
         with self._changed:
             self._readers += 1
-            self._behind[id(reader)] = 0
         try:
             yield reader
         finally:
             with self._changed:
                 self._readers -= 1
-                del self._behind[id(reader)]
 
     def follow(self, reader: Reader, seconds: float) -> bytes:
-        """What came since the reader's place, or nothing after so long. What it is sent counts as told when it comes again."""
+        """What came since the reader's place, or nothing after so long."""
         until = time.monotonic() + seconds
         with self._changed:
-            self._behind[id(reader)] = reader.place
             self._waiting += 1
             try:
                 while self._serial <= reader.place and not self.closed and (left := until - time.monotonic()) > 0:

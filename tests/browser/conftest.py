@@ -1,4 +1,5 @@
-"""A browser for these tests, which `make browser` runs: Chromium, without a window. CHROMIUM names another one than the first that is found."""
+"""A browser for these tests, which `make browser` runs: Chromium, without a window. CHROMIUM is its path where it is not found
+by itself."""
 
 from __future__ import annotations
 
@@ -11,6 +12,7 @@ from typing import Any
 import pytest
 from standin import Standin
 
+FIGURES: list[str] = []
 FOUND = ("chromium", "chromium-browser", "google-chrome")
 
 
@@ -18,6 +20,17 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if Path(__file__).parent in item.path.parents:
             item.add_marker(pytest.mark.browser)
+
+
+def pytest_terminal_summary(terminalreporter: Any) -> None:
+    for line in FIGURES:
+        terminalreporter.write_line(line)
+
+
+@pytest.fixture
+def figure() -> Callable[[str], None]:
+    """Says what was measured at the end of the session; nothing is decided by it."""
+    return FIGURES.append
 
 
 @pytest.fixture(scope="session")

@@ -20,6 +20,7 @@ import numpy as np
 PAGE = Path(__file__).resolve().parents[2] / "bench" / "live" / "page"
 TOKEN = "a-token-of-the-tests"
 CSP = "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'self'"
+ZONES = (("A/B", 0.3), ("B/C", 0.4), ("C/D", 0.5))
 MICRON, RPM = 1e-6, np.pi / 30
 ENVELOPE_M, CLEARANCE_M, SPEED_RAD_S = 150e-6, 250e-6, 45.0
 
@@ -60,7 +61,7 @@ def channels() -> list[dict[str, Any]]:
 def hello(**changed: Any) -> dict[str, Any]:
     orbits = [
         {"name": place, "x": f"pos_x{letter}", "y": f"pos_y{letter}", "clearance_m": CLEARANCE_M,
-         "zones": [{"name": name, "radius_m": share * CLEARANCE_M} for name, share in (("A/B", 0.3), ("B/C", 0.4), ("C/D", 0.5))]}
+         "zones": [{"name": name, "radius_m": share * CLEARANCE_M} for name, share in ZONES]}
         for place, letter in (("inboard", "i"), ("outboard", "o"))
     ]  # fmt: skip
     return {
@@ -92,8 +93,10 @@ def samples(begin_s: float, end_s: float) -> dict[str, Any]:
         }
         for name, size, lag in (("inboard", 6e-5, 0.4), ("outboard", 3e-5, -0.2))
     }
-    return {"t": packed(t, "<f8"), "lost": 0, "channels": told, "orbits": orbits, "state": "LEVITATED", "fault": "NONE",
-            "speed_rpm": SPEED_RAD_S / RPM + 0.2 * float(rng.standard_normal()), "age_ms": 10.0, "sent_ms": 1e3 * time.time()}  # fmt: skip
+    return {
+        "t": packed(t, "<f8"), "lost": 0, "channels": told, "orbits": orbits, "state": "LEVITATED", "fault": "NONE",
+        "speed_rpm": SPEED_RAD_S / RPM + 0.2 * float(rng.standard_normal()), "age_ms": 10.0, "sent_ms": 1e3 * time.time(),
+    }  # fmt: skip
 
 
 def _course(k: int, channel: dict[str, Any], t: np.ndarray) -> np.ndarray:
@@ -171,7 +174,7 @@ class Handler(BaseHTTPRequestHandler):
         body = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
         run = self.server.run
         if self.headers.get("X-Levbench-Token") != TOKEN or run.refuses:
-            self._send(run.refuses or 403, b'{"error": "refused"}', "application/json")
+            self._send(run.refuses or 403, b"refused: by the test", "text/plain")
         elif self.path == "/stop":
             run.stops.append(body)
             self._send(202, b"{}", "application/json")
@@ -195,7 +198,7 @@ class Handler(BaseHTTPRequestHandler):
     def _events(self) -> None:
         run = self.server.run
         if self.headers.get("X-Levbench-Token") != TOKEN or run.refuses:
-            self._send(run.refuses or 403, b'{"error": "the token is missing or another run\'s"}', "application/json")
+            self._send(run.refuses or 403, b"the token is missing or another run's", "text/plain")
             return
         while run.holds and not run.ending:
             time.sleep(0.05)
@@ -262,13 +265,15 @@ PROMPT = {
                 "Press Enter when it hangs still, or type stop to end the run, ? for more.",
     "choices": [{"label": "It hangs still", "answer": ""}],
 }  # fmt: skip
-FINDINGS = (
-    {"code": "calibration-due", "text": "The load cell's calibration is due on 2026-12-01.", "where": "load cell", "effect": "note"},
-    {"code": "missing-samples", "text": "3 of 12 000 samples are missing in step 12; its mean leaves them out.", "where": "hang 12",
-     "effect": "note"},
-    {"code": "load-not-still", "text": "The hanging mass swings: 0.8 N of 5 Hz.", "where": "hang 14", "effect": "indeterminate"},
-    {"code": "stuck-channel", "text": "pos_yi has stood on 12.3 µm for 1.0 s while the tick went on.", "where": "pos_yi", "effect": "error"},
-)  # fmt: skip
+FINDINGS = tuple(
+    {"code": code, "text": text, "where": where, "effect": effect}
+    for code, text, where, effect in (
+        ("calibration-due", "The load cell's calibration is due on 2026-12-01.", "load cell", "note"),
+        ("missing-samples", "3 of 12 000 samples are missing in step 12; its mean leaves them out.", "hang 12", "note"),
+        ("load-not-still", "The hanging mass swings: 0.8 N of 5 Hz.", "hang 14", "indeterminate"),
+        ("stuck-channel", "pos_yi has stood on 12.3 µm for 1.0 s while the tick went on.", "pos_yi", "error"),
+    )
+)
 LOG = (
     "links: controller in this process",
     "supply 148.0 V",
@@ -279,7 +284,8 @@ RESULTS = [
     {"name": "K@inboard", "value": 75.004, "U": 0.21, "unit": "N/A", "verdict": "pass"},
     {"name": "K@outboard", "value": 74.876, "U": 0.34, "unit": "N/A", "verdict": "pass"},
     {"name": "i_0@inboard", "value": 0.01234, "U": 0.0031, "unit": "A", "verdict": "none"},
-    {"name": "runout@inboard", "value": 4.21e-6, "U": 2.1e-7, "unit": "m", "display_unit": "um", "factor": 1e-6, "verdict": "pass"},
+    {"name": "runout@inboard", "value": 4.21e-6, "U": 2.1e-7, "unit": "m", "display_unit": "um", "factor": MICRON,
+     "verdict": "pass"},
 ]  # fmt: skip
 
 

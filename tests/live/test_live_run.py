@@ -280,7 +280,8 @@ def test_a_page_that_cannot_be_made_ends_no_run(watched: Watched, monkeypatch: p
 
     monkeypatch.setattr("bench.live.view.view_of", broken)
     monkeypatch.setattr("bench.live.progress.LiveProgress._tell_finding", broken)
-    assert watched.run(tiny_procedures.levitated).outcome is Outcome.DONE
+    lossy = doing(lambda bench: setattr(bench.counters, "lost", 3))
+    assert [f.code for f in watched.run(lossy).record.findings] == ["samples-lost", "steps-missing"]
 
 
 def test_a_run_that_does_not_start_says_so_on_the_page() -> None:

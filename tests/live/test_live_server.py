@@ -6,6 +6,7 @@ import base64
 import math
 import socket
 from collections.abc import Iterator
+from email.message import Message
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,8 @@ from live_client import Client, Page
 from made_run import MadeRun
 
 from bench.errors import ConfigError
-from bench.live import site
+from bench.live import handler, site
+from bench.live.gate import check_host
 from bench.question import Answer, Choice, Question
 
 ASSET, TOKEN = "/index.html", "X-Levbench-Token"
@@ -147,9 +149,9 @@ def test_the_page_says_nothing_of_the_run_without_the_token(shared: MadeRun, cli
 
 
 def test_a_page_that_comes_late_is_told_what_stands(made: MadeRun, own: Client) -> None:
-    made.hello()
     made.hub.tell("finding", {"id": "a", "text": "3 samples"}, "a")
     made.hub.tell("log", {"text": "first line"})
+    made.hello()
     for done in range(100):
         made.hub.tell("progress", {"done": done})
     made.hub.tell("finding", {"id": "a", "text": "17 samples"}, "a")
@@ -290,3 +292,19 @@ def test_a_client_that_says_nothing_holds_only_its_place(made: MadeRun, own: Cli
     finally:
         for connection in silent:
             connection.close()
+
+
+def test_a_request_that_dribbles_is_given_up(made: MadeRun, own: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(handler, "HEAD_S", 0.3)
+    with socket.create_connection((own.host, own.port), timeout=20.0) as connection:
+        connection.sendall(b"GET / HT")
+        assert connection.recv(100) == b""
+
+
+@pytest.mark.parametrize(
+    ("local", "host"), [("::ffff:10.1.2.3", "10.1.2.3:80"), ("10.1.2.3", "10.1.2.3"), ("fe80::1%eth0", "[fe80::1]:80")]
+)
+def test_the_address_at_which_a_request_came_in_is_its_host(local: str, host: str) -> None:
+    headers = Message()
+    headers["Host"] = host
+    assert check_host(headers, local, 80) == host

@@ -1,1 +1,4 @@
-"""What a browser loads of the live page: files as they are, without Python. `uplot.*` is uPlot 1.6.32 (npm), MIT: `uplot.LICENSE`."""
+"""What a browser loads of the live page: files as they are, without Python.
+
+`uplot.*` are those of uPlot 1.6.32 (https://github.com/leeoniya/uPlot, package `uplot` of npm), MIT: `uplot.LICENSE`.
+"""

@@ -14,7 +14,7 @@ const TICK_MS = 200;
 const $ = (id) => document.getElementById(id);
 
 const run = { token: takeToken(), hello: null, ended: null, asked: false, stopping: false, link: "connecting", why: "", retryAt: 0, retry: () => {} };
-const newest = { receivedAt: null, ageThen: 0, lost: 0, last: {}, t_s: NaN };
+const newest = { receivedAt: null, ageThen: 0, lost: 0, told: null, t_s: NaN };
 const clockDifference = { least: Infinity }; // least of received - sent, ms: what is over it is delay on the way
 
 const findings = findingsView();
@@ -26,7 +26,7 @@ const prompt = promptView((id, answer) => post(run.token, "answer", { id, answer
 const heard = {
   hello(hello) {
     if (run.hello?.run_id !== hello.run_id) {
-      Object.assign(newest, { receivedAt: null, ageThen: 0, lost: 0, last: {}, t_s: NaN });
+      Object.assign(newest, { receivedAt: null, ageThen: 0, lost: 0, told: null, t_s: NaN });
       pictures.begin(hello, new History(hello.channels.map((c) => c.name)));
       stop.begin();
       stop.allow(hello.may_stop !== false);
@@ -51,8 +51,8 @@ const heard = {
     newest.lost += block.lost || 0;
     pictures.take(block, float32);
     newest.t_s = pictures.newestTime();
-    showSample({ ...block, t_s: newest.t_s });
-    pictures.draw(newest.lost, () => document.dispatchEvent(new CustomEvent("drawn", { detail: { age_ms: age(), sent_ms: block.sent_ms } })));
+    newest.told = { state: block.state, fault: block.fault, speed_rpm: block.speed_rpm, t_s: newest.t_s };
+    pictures.draw(newest.lost, () => document.dispatchEvent(new CustomEvent("drawn", { detail: { sent_ms: block.sent_ms, age_ms: block.age_ms } })));
   },
   progress: showProgress,
   finding: findings.add,
@@ -107,6 +107,7 @@ function showLink() {
   stop.link(!run.hello || run.link === "live");
   $("old").hidden = !stands;
   $("old").textContent = ms === null ? "No data yet." : `No new data for ${ageText(ms)}: the plots stand still.`;
+  if (newest.told) showSample(newest.told);
   if (!run.ended) showAge(ms, Boolean(stands));
   $("age").closest("div").hidden = Boolean(run.ended);
 }

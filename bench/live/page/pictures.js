@@ -4,6 +4,29 @@ import { ALL, colours, groupsOf, panelsOf, plotOf } from "./plots.js";
 
 const $ = (id) => document.getElementById(id);
 
+function tabOf(group, choose) {
+  const tab = document.createElement("button");
+  tab.type = "button";
+  tab.textContent = group;
+  tab.setAttribute("role", "tab");
+  tab.setAttribute("aria-controls", "plots");
+  tab.addEventListener("click", () => choose(group));
+  return tab;
+}
+
+function arrowsMove(list, choose) {
+  list.addEventListener("keydown", (event) => {
+    const way = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+    const tabs = [...list.children];
+    const at = tabs.indexOf(document.activeElement);
+    if (!way || at < 0) return;
+    const next = tabs[(at + way + tabs.length) % tabs.length];
+    next.focus();
+    choose(next.textContent);
+  });
+}
+
+/** The group that is chosen, drawn when samples came; `hold` keeps a moment. */
 export function picturesView(orbitOf) {
   const now = { history: null, panels: [], plots: [], orbits: [], group: "", last: {}, held: null, asked: false, lost: 0 };
   let palette = colours();
@@ -44,28 +67,7 @@ export function picturesView(orbitOf) {
     ask();
   };
 
-  const makeTabs = (groups) => {
-    $("tabs").replaceChildren(...groups.map((group) => {
-      const tab = document.createElement("button");
-      tab.type = "button";
-      tab.textContent = group;
-      tab.setAttribute("role", "tab");
-      tab.setAttribute("aria-controls", "plots");
-      tab.addEventListener("click", () => choose(group));
-      return tab;
-    }));
-    $("tabs").hidden = groups.length < 2;
-  };
-
-  $("tabs").addEventListener("keydown", (event) => {
-    const way = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
-    const tabs = [...$("tabs").children];
-    const at = tabs.indexOf(document.activeElement);
-    if (!way || at < 0) return;
-    const next = tabs[(at + way + tabs.length) % tabs.length];
-    next.focus();
-    choose(next.textContent);
-  });
+  arrowsMove($("tabs"), choose);
   $("window").addEventListener("change", ask);
   $("hold").addEventListener("click", () => {
     now.held = now.held === null && now.history ? now.history.last : null;
@@ -92,7 +94,8 @@ export function picturesView(orbitOf) {
       $("round").hidden = !now.orbits.length;
       redrawOrbits();
       const groups = groupsOf(now.panels);
-      makeTabs(groups);
+      $("tabs").replaceChildren(...groups.map((group) => tabOf(group, choose)));
+      $("tabs").hidden = groups.length < 2;
       choose(groups[0] || ALL);
     },
     /** A block of samples. */

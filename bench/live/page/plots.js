@@ -7,6 +7,7 @@ import { clock, decimalsOf, fixed, shownIn } from "./text.js";
 const MOST_LINES = 4; // in one plot; more are unreadable
 const POINTS = 400;
 const HEIGHT = 190;
+const READ_MS = 200; // numbers that change faster cannot be read
 export const ALL = "All";
 const REST = "Machine";
 const KINDS = { position: "positions", current: "currents", speed: "speed", temperature: "temperatures", supply: "supply" };
@@ -145,6 +146,17 @@ function legendOf(panel) {
   return { list, values };
 }
 
+/** The values of a plot's channels: under the cursor, from least to greatest, else the newest. */
+function write(panel, values, chart, latest) {
+  const decimals = decimalsOf(chart.scales.y.max - chart.scales.y.min);
+  const at = chart.cursor.idx;
+  panel.channels.forEach(({ name, shown }, k) => {
+    const [high, low] = typeof at === "number" ? [chart.data[2 * k + 1][at], chart.data[2 * k + 2][at]] : [];
+    const last = typeof latest[name] === "number" ? (latest[name] - shown.offset) / shown.factor : null;
+    values[k].textContent = typeof low === "number" ? `${fixed(low, decimals)} … ${fixed(high, decimals)}` : fixed(last, decimals);
+  });
+}
+
 /** One plot in the document: {node, show(history, window, end, last), visible, group, remove()}. */
 export function plotOf(panel, palette) {
   const node = document.createElement("figure");
@@ -157,16 +169,10 @@ export function plotOf(panel, palette) {
   const plot = { node, group: panel.group, visible: false };
   let chart = null;
   let latest = {};
-  const label = () => {
-    const decimals = chart ? decimalsOf(chart.scales.y.max - chart.scales.y.min) : 3;
-    const at = chart?.cursor.idx;
-    panel.channels.forEach(({ name, shown }, k) => {
-      const under = typeof at === "number" && chart.data[2 * k + 1]?.[at];
-      const low = typeof under === "number" ? chart.data[2 * k + 2][at] : null;
-      const last = latest[name];
-      const now = typeof last === "number" ? (last - shown.offset) / shown.factor : null;
-      values[k].textContent = low === null ? fixed(now, decimals) : `${fixed(low, decimals)} … ${fixed(under, decimals)}`;
-    });
+  let labelled = 0;
+  const label = (u) => {
+    labelled = performance.now();
+    write(panel, values, u, latest);
   };
   plot.show = (history, seconds, end, last) => {
     latest = last;
@@ -179,7 +185,7 @@ export function plotOf(panel, palette) {
       const from = Math.max(0, end - seconds); // a run begins at 0 and fills the picture from its left
       chart.setScale("x", { min: from, max: from + seconds });
     });
-    label();
+    if (performance.now() - labelled >= READ_MS) label(chart);
   };
   plot.redraw = () => chart?.redraw(false);
   plot.remove = () => { chart?.destroy(); node.remove(); };

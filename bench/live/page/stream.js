@@ -46,12 +46,12 @@ export function eventParser(told) {
   };
 }
 
-/** What a text of JSON says; nothing where it is something else. */
+/** What a reply says: an object of JSON, or a refusal's line of text as {error}. */
 function read(text) {
   try {
     return JSON.parse(text) ?? {};
   } catch {
-    return {};
+    return { error: text.slice(0, 300) };
   }
 }
 
@@ -98,7 +98,13 @@ export function listen(token, { heard, opened, lost, refused, over, gone }) {
     const timer = setTimeout(done, ms);
     wake = () => { clearTimeout(timer); done(); };
   });
-  const tell = (name, data) => heard(name, read(data));
+  const tell = (name, data) => { // what cannot be shown is left out, and the rest goes on
+    try {
+      heard(name, JSON.parse(data));
+    } catch (error) {
+      console.error(`event ${name}:`, error);
+    }
+  };
   (async () => {
     while (!over()) {
       let why = "the run closed the connection";
