@@ -9,7 +9,7 @@ from pathlib import Path
 
 import jsonschema
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bench.errors import ConfigError
@@ -87,6 +87,7 @@ def test_a_run_by_path_name_beginning_and_last(tmp_path: Path, monkeypatch: pyte
     assert run_named("last~2", Path()).path == first
 
 
+@settings(max_examples=30)
 @given(st.text(max_size=300) | st.from_regex(r"last~\d*", fullmatch=True) | st.text("amb-/.~x", max_size=400))
 def test_whatever_is_said_is_a_run_or_one_message(root: Path, word: str) -> None:
     try:
