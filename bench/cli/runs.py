@@ -44,6 +44,17 @@ def runs_command(request: RunsRequest) -> int:
     out = request.out
     if out.exists() and not out.is_dir():
         raise ConfigError(f"--out {out}: found a file; expected a folder of run directories")
+    with index.uncollected():
+        found = _told(request)
+    if not found:
+        asked = any((request.procedure, request.rig, request.failed))
+        sys.stderr.write(f"no runs in {out}{' that are as asked for' if asked else ''}\n")
+    return 0
+
+
+def _told(request: RunsRequest) -> list[IndexEntry]:
+    """The runs that are asked for, printed."""
+    out = request.out
     try:
         found = index.entries(
             out, procedure=request.procedure, rig=request.rig, failed=request.failed, last=request.last
@@ -56,10 +67,7 @@ def runs_command(request: RunsRequest) -> int:
         sys.stdout.write("\n")
     else:
         sys.stdout.writelines(_lines(found, out, shown, columns() if sys.stdout.isatty() else None))
-    if not found:
-        asked = any((request.procedure, request.rig, request.failed))
-        sys.stderr.write(f"no runs in {out}{' that are as asked for' if asked else ''}\n")
-    return 0
+    return found
 
 
 def _shown(request: RunsRequest, found: Sequence[IndexEntry]) -> Shown:
@@ -86,41 +94,48 @@ def _shown(request: RunsRequest, found: Sequence[IndexEntry]) -> Shown:
 
 def _lines(found: Sequence[IndexEntry], out: Path, shown: Shown, width: int | None) -> Iterator[str]:
     """A line each: outcome, what is shown of it, rig, which virtual one, the run directory. On a terminal that is too narrow
-    the directory goes by its name, then which rig it was is left out, and at last what is shown gets a line of its own."""
-    values = {name: {run: _value(r) for run, r in by_run.items()} for name, by_run in shown.items()}
-    told = [[by_run.get(e.run_id, "-") for by_run in values.values()] for e in found] if shown else []
-    paths = [f"{out / e.run_id}" for e in found] if width else [f"{out}/{e.run_id}" for e in found]
-    table = [
-        [e.outcome for e in found],
-        *map(list, zip(*told, strict=True)),
-        [e.rig for e in found],
-        [_which(e) for e in found],
-    ]
-    heads = ["", *shown, "", ""]
-    sizes = [max(len(head), max(map(len, column), default=0)) for head, column in zip(heads, table, strict=True)]
-    last = max(map(len, paths), default=0)
-    if width is not None and sum(sizes) + len(sizes) + last > width:
+    the directory goes by its name, then which rig it was is left out, and at last what is shown gets a line of its own.
+
+    Very many runs are of few kinds: what is the same in all runs of one is put together once."""
+    kinds = [(e.outcome, e.rig, e.served, e.seed, e.visit) for e in found]
+    ends = {kind: [kind[1], _which(*kind[2:])] for kind in set(kinds)}
+    values = [{run: _value(r) for run, r in by_run.items()} for by_run in shown.values()]
+    outcomes = max((len(kind[0]) for kind in ends), default=0)
+    sizes = [max(len(name), *map(len, column.values()), 1) for name, column in zip(shown, values, strict=True)]
+    tails = [max((len(end[k]) for end in ends.values()), default=0) for k in (0, 1)]
+    paths = [f"{out}/{e.run_id}" for e in found]
+    longest = max(map(len, paths), default=0)
+
+    def wide() -> int:
+        return 1 + outcomes + sum(sizes) + sum(tails) + len(sizes) + len(tails) + longest
+
+    if width is not None and wide() > width:
         paths = [e.run_id for e in found]
-        last = max(map(len, paths), default=0)
-        while len(sizes) > 1 + len(shown) and sum(sizes) + len(sizes) + last > width:
-            table.pop()
-            sizes.pop()
-    below = bool(shown) and width is not None and sum(sizes) + len(sizes) + last > width
-    if shown and not below:
-        yield " ".join(head.ljust(size) for head, size in zip(heads, sizes, strict=False)).rstrip() + "\n"
-    for k, path in enumerate(paths):
-        cells = [column[k].ljust(size) for column, size in zip(table, sizes, strict=True)]
-        if below:
-            yield f"{cells[0]} {path}\n"
-            yield from (f"  {name} {text[k]}\n" for name, text in zip(shown, table[1:], strict=False) if text[k] != "-")
-        else:
-            yield f"{' '.join(cells)} {path}\n"
+        longest = max(map(len, paths), default=0)
+        while tails and wide() > width:
+            tails.pop()
+    below = width is not None and bool(shown) and wide() > width
+    start = {kind: kind[0].ljust(outcomes) for kind in ends}
+    end = {kind: "".join(f"{text:{n}} " for text, n in zip(texts, tails, strict=False)) for kind, texts in ends.items()}
+    if not shown:
+        whole = {kind: f"{start[kind]} {end[kind]}" for kind in ends}
+        yield from [f"{whole[kind]}{path}\n" for kind, path in zip(kinds, paths, strict=True)]
+        return
+    if below:
+        for kind, path, e in zip(kinds, paths, found, strict=True):
+            yield f"{start[kind]} {end[kind]}{path}\n"
+            yield from (f"  {name} {v[e.run_id]}\n" for name, v in zip(shown, values, strict=True) if e.run_id in v)
+        return
+    yield " ".join([" " * outcomes, *(name.ljust(n) for name, n in zip(shown, sizes, strict=True))]).rstrip() + "\n"
+    for kind, path, e in zip(kinds, paths, found, strict=True):
+        cells = " ".join(v.get(e.run_id, "-").ljust(n) for v, n in zip(values, sizes, strict=True))
+        yield f"{start[kind]} {cells} {end[kind]}{path}\n"
 
 
-def _which(e: IndexEntry) -> str:
-    if e.served:
+def _which(served: bool, seed: int | None, visit: int | None) -> str:
+    if served:
         return "served simulation"
-    return "" if e.seed is None else f"seed {e.seed}, visit {e.visit}" if e.visit else f"seed {e.seed}"
+    return "" if seed is None else f"seed {seed}, visit {visit}" if visit else f"seed {seed}"
 
 
 def _value(r: Result) -> str:

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from bench.errors import ConfigError
-from bench.run.indexrow import IndexEntry, Result, Row
+from bench.run.indexrow import IndexEntry, MadeWith, Result, Row
 from bench.rundir import RunDirectory, runs_in
 
 NAME = "index.sqlite"
@@ -27,10 +27,11 @@ log = logging.getLogger(__name__)
 
 
 RUN_COLUMNS = ", ".join(IndexEntry._fields)
+MADE = ", ".join(MadeWith._fields)
 CALLED = "name, full, quantity, place, unit"
 TABLES = f"""
-    CREATE TABLE runs (run INTEGER PRIMARY KEY, {RUN_COLUMNS}, settings, parameters, firmware, certificates, calibrations,
-                       UNIQUE (run_id));
+    CREATE TABLE runs (run INTEGER PRIMARY KEY, {RUN_COLUMNS}, made INTEGER, UNIQUE (run_id));
+    CREATE TABLE made_with (made INTEGER PRIMARY KEY, {MADE}, UNIQUE ({MADE}));
     CREATE INDEX runs_by_time ON runs (started, run_id);
     CREATE TABLE names (number INTEGER PRIMARY KEY, {CALLED}, UNIQUE ({CALLED}));
     CREATE TABLE results (number INTEGER, run INTEGER, ordinal INTEGER, value, u, expanded, dof, p, lower, upper, verdict,
@@ -75,7 +76,7 @@ def entries(
         return []
     where, values = _chosen(procedure, rig, failed)
     query = f"SELECT {RUN_COLUMNS} FROM runs r {where} ORDER BY started {{0}}, r.run_id {{0}}"
-    with _uncollected():
+    with uncollected():
         return [IndexEntry._make(row) for row in _answered(root, lambda db: _there(db, root, query, values, last))]
 
 
@@ -96,14 +97,15 @@ def results(
     where, values = _chosen(procedure, rig, failed, of)
     # The newest few are found by going back through the runs, all of a series where they lie together.
     tables = "runs r CROSS JOIN results s ON s.run = r.run" if last or of else "results s JOIN runs r USING (run)"
+    tables += " JOIN names n ON n.number = s.number JOIN made_with USING (made)"
 
     def asked(db: sqlite3.Connection) -> list[tuple[Any, ...]]:
         named = "" if quantity is None else f" AND s.number IN ({', '.join(map(str, _meant(db, quantity)))})"
-        query = (f"SELECT {_READ} FROM {tables} JOIN names n ON n.number = s.number {where or 'WHERE 1'}{named} "
+        query = (f"SELECT {_READ} FROM {tables} {where or 'WHERE 1'}{named} "
                  "ORDER BY started {0}, r.run_id {0}, ordinal {0}")  # fmt: skip
         return _there(db, root, query, values, last if of is None else len(of))
 
-    with _uncollected():
+    with uncollected():
         return [Result._make((*row, root)) for row in _answered(root, asked)]
 
 
@@ -163,8 +165,9 @@ def _answered(root: Path, ask: Callable[[sqlite3.Connection], T]) -> T:
             with _opened(root) as db:
                 if db.execute("PRAGMA user_version").fetchone()[0] == VERSION:
                     return ask(db)
-        except sqlite3.OperationalError:
-            raise
+        except sqlite3.OperationalError as error:
+            if "no such" not in str(error):  # a table or column: it was made otherwise
+                raise
         except sqlite3.DatabaseError:
             pass
         rebuild(root)
@@ -178,7 +181,7 @@ def _filled(root: Path) -> list[str]:
     messages: list[str] = []
     with _opened(root) as db:
         db.execute("BEGIN IMMEDIATE")  # before the records are read: another process adds before or after, not between
-        for table in ("runs", "names", "results"):
+        for table in ("runs", "made_with", "names", "results"):
             db.execute(f"DROP TABLE IF EXISTS {table}")
         for statement in filter(str.strip, TABLES.split(";")):
             db.execute(statement)
@@ -198,16 +201,22 @@ def _put(db: sqlite3.Connection, row: Row) -> None:
     for (run,) in db.execute("SELECT run FROM runs WHERE run_id = ?", row.entry[:1]).fetchall():
         db.execute("DELETE FROM results WHERE run = ?", (run,))
         db.execute("DELETE FROM runs WHERE run = ?", (run,))
-    of_run = (None, *row.entry, *row.made_with)
+    of_run = (None, *row.entry, _kept(db, "made_with", "made", MADE, row.made_with))
     run = db.execute(f"INSERT INTO runs VALUES ({', '.join('?' * len(of_run))})", of_run).lastrowid
     for ordinal, (called, numbers) in enumerate(row.results):
-        known = db.execute(f"SELECT number FROM names WHERE ({CALLED}) = (?, ?, ?, ?, ?)", called).fetchone()
-        number = known[0] if known else db.execute("INSERT INTO names VALUES (NULL, ?, ?, ?, ?, ?)", called).lastrowid
+        number = _kept(db, "names", "number", CALLED, called)
         db.execute("INSERT INTO results VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", (number, run, ordinal, *numbers))
 
 
+def _kept(db: sqlite3.Connection, table: str, key: str, columns: str, texts: tuple[str, ...]) -> int:
+    """The number of what many rows share, which a table has once."""
+    places = ", ".join("?" * len(texts))
+    known = db.execute(f"SELECT {key} FROM {table} WHERE ({columns}) = ({places})", texts).fetchone()
+    return int(known[0] if known else db.execute(f"INSERT INTO {table} VALUES (NULL, {places})", texts).lastrowid or 0)
+
+
 @contextmanager
-def _uncollected() -> Iterator[None]:
+def uncollected() -> Iterator[None]:
     """Rows are tuples of numbers and texts: to look among very many of them for circles takes longer than to read them."""
     enabled = gc.isenabled()
     gc.disable()
