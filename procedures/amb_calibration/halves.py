@@ -4,11 +4,15 @@ The same mass at the same angle asks for the same force. What the fit's terms ma
 positions add, differs by d = r' - r; a hanging scatters (its strap seats anew, noise) by the covariance that the fit's
 residuals have, freed of a step between the halves, so that d has twice that variance. |d| beyond Student's t at CHANCE is a
 drift, told with its 95 % interval: of current or position sensors, of the magnets, or a hanger that hangs otherwise.
+
+Sensors that cool while the machine is off drift by what can be seen and does not matter. A drift decides where K would move by
+more than MATTERS of its own U: as a step of the force's zero, which moves K at an angle that the seam parts, or, with a mass
+on, as one of its scale, which moves K at every angle after it, whichever is more.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,22 +32,28 @@ from procedures.amb_calibration.steps import Hang, HangingData, arrays
 Array = npt.NDArray[np.float64]
 DRIFTED, UNCHECKED = "drift-between-halves", "halves-unchecked"
 CHANCE = 1e-3  # that a sound run tells a drift, of all its axes together
+MATTERS = 0.5
+LOADED = 0.2  # of the load range: less says nothing of a scale
 
 
 @dataclass(frozen=True)
 class Difference:
     """A hanging that was done in both halves: its angle and its place among those there; `forces` (K,) N, second less first,
-    of each axis, their standard deviations `u` and degrees of freedom."""
+    of each axis, their standard deviations `u` and degrees of freedom, and by how much K would move by such a drift, N/A."""
 
     angle: int
     place: int
     forces: Array
     u: Array
     dof: float
+    shifts: Array
 
 
-def findings(recording: Recording[Plan], data: HangingData, f: Fit, p: Mapping[str, float]) -> Iterator[Finding]:
-    """A finding for each axis that drifted between two halves, and for halves that nothing holds together."""
+def findings(
+    recording: Recording[Plan], data: HangingData, f: Fit, p: Mapping[str, float], expanded: Sequence[float]
+) -> Iterator[Finding]:
+    """A finding for each axis that drifted between two halves, and for halves that nothing holds together. `expanded` is U of
+    each axis' K, N/A."""
     pull = data.hangings.pull
     repeats = _of_pull(recording, pull, f"{Hang.kind}{AGAIN}")
     hangings = _of_pull(recording, pull, Hang.kind)
@@ -58,7 +68,7 @@ def findings(recording: Recording[Plan], data: HangingData, f: Fit, p: Mapping[s
             yield Finding(UNCHECKED, text, "", Effect.INDETERMINATE)
             continue
         found = difference(recording, data, f, p, before[-1], after)
-        yield from _drifts(found, data, f)
+        yield from _drifts(found, data, f, expanded)
 
 
 def difference(
@@ -74,10 +84,22 @@ def difference(
     moved = left_over(changed, f, p, plan.bias_A, count) - left_over(h, f, p, plan.bias_A, count)
     one, axes = _scatter(recording, data, f, p), range(len(f.terms))
     u = np.sqrt([2 * one.covariance[(b, b, *at)] for b in axes])
-    return Difference(at[0], at[1], moved[(slice(None), *at)], u, float(one.dof))
+    d = moved[(slice(None), *at)]
+    return Difference(at[0], at[1], d, u, float(one.dof), _shifts(f, data.table.start_ns >= second.start_ns, at, d))
 
 
-def _drifts(found: Difference, data: HangingData, f: Fit) -> Iterator[Finding]:
+def _shifts(f: Fit, after: npt.NDArray[np.bool_], at: tuple[int, int], d: Array) -> Array:
+    """By how much K (mean over the angles) would move by a step d (K,) N of the zero, or of the scale, at a seam, (K,) N/A."""
+    zero = np.einsum("bap,ap->ba", f.solvers[:, :, 1, :], after.astype(np.float64)).mean(axis=1) * d
+    load = f.forces[(slice(None), *at)]
+    known = np.abs(load) > LOADED * np.ptp(f.forces, axis=(1, 2))
+    relative = np.divide(d, load, out=np.zeros_like(d), where=known)
+    moved = np.einsum("bap,bap->ba", f.solvers[:, :, 1, :], after * f.forces).mean(axis=1)
+    out: Array = np.maximum(np.abs(zero), np.abs(relative * moved))
+    return out
+
+
+def _drifts(found: Difference, data: HangingData, f: Fit, expanded: Sequence[float]) -> Iterator[Finding]:
     from scipy.special import stdtrit
 
     limit = float(stdtrit(found.dof, 1 - CHANCE / len(found.forces) / 2))
@@ -89,13 +111,18 @@ def _drifts(found: Difference, data: HangingData, f: Fit) -> Iterator[Finding]:
         d, u = float(found.forces[b]), float(found.u[b])
         if abs(d) <= limit * u:
             continue
-        share = abs(d) / float(np.ptp(f.forces[b]))
+        share, matters = abs(d) / float(np.ptp(f.forces[b])), found.shifts[b] > MATTERS * expanded[b]
         text = (
             f"the last hanging before the run was stopped ({what}), done again when it went on, asks the {axis.title} for "
-            f"{d:+.3f} N ± {k * u:.3f} N more ({share:.2%} of the load range): something drifted between the halves, a current "
-            "or position sensor, the magnets, or how the hanger hangs. Next: run it anew, all in one"
+            f"{d:+.3f} N ± {k * u:.3f} N more ({share:.2%} of the load range), by which K would move by "
+            f"{found.shifts[b]:.2g} N/A (its U is {expanded[b]:.2g} N/A)"
         )
-        yield Finding(DRIFTED, text, axis.where, Effect.INDETERMINATE)
+        if matters:
+            text += (
+                ": something drifted between the halves, a current or position sensor, the magnets, or how the hanger hangs. "
+                "Next: run it anew, all in one"
+            )
+        yield Finding(DRIFTED, text, axis.where, Effect.INDETERMINATE if matters else Effect.NOTE)
 
 
 def _of_pull(recording: Recording[Plan], pull: Pull, kind: str) -> list[Step]:

@@ -22,7 +22,7 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.roles import STATUS
-from bench.uncertainty import Estimate, propagate
+from bench.uncertainty import Estimate, interval, propagate
 from procedures.amb_calibration import both_coils, checks, halves, hypotheses, turns
 from procedures.amb_calibration import by_angle as amb_calibration_by_angle
 from procedures.amb_calibration import figures as drawn
@@ -105,7 +105,9 @@ def _evaluated(recording: Recording[Plan], findings: Findings, pull: Pull, sever
     if several:
         a = replace(a, identity=f"scatter/{pull.hook}")
     values = {name: e.value for name, e in a.inputs.items()}
-    findings.add(halves.findings(recording, data, a.fit, values))
+    told = _scattered(a)
+    expanded = [interval(told[f"K_{key}"]).U for key in a.fit.pull.keys]
+    findings.add(halves.findings(recording, data, a.fit, values, expanded))
     findings.gate(
         checks.of_fit(data, a.fit, a.scatter, a.loads, a.beyond, values, plan, masses_u(recording)), checks.FATAL
     )
