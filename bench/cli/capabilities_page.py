@@ -36,6 +36,7 @@ controller's own memory; the others are keys of `[capabilities]`, and the table 
 def rigs() -> tuple[RigFile, ...]:
     """The rig files of `rigs/` and of `examples/`."""
     paths = [*sorted((ROOT / "rigs").glob("*.toml")), *sorted((ROOT / "examples").glob("*/*.toml"))]
+    paths = [path for path in paths if path.name != "pyproject.toml"]
     return tuple(load_rig(str(path)) for path in paths)
 
 
