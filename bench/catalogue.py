@@ -153,7 +153,7 @@ def entry(name: str) -> Entry:
 def of_file(path: Path) -> Entry | None:
     """The line of the procedure whose module a file is, if it is one's."""
     for candidate in procedures():
-        where = file_of(candidate)
+        where = file_of(candidate) if candidate.module.rpartition(".")[2] in (path.stem, path.parent.name) else None
         if where is not None and where.exists() and where.samefile(path):
             return candidate
     return None

@@ -106,7 +106,7 @@ def test_its_intervals_hold_the_truth(folder: Path) -> None:
         '[virtual]\ncount = 30\nfirst_seed = 0\n[[step]]\nprocedure = "coil-constant"\n'
     )
     status, out, err = python(folder, "bench.cli", "campaign", "ball-coverage.toml", "--no-report", "--jobs", "1")
-    assert status == 0, err + out
+    assert status in (0, 5), err + out  # so few rigs leave the campaign's own bands undecided
     lines = [json.loads(line) for line in (folder / out.splitlines()[-1] / "journal.jsonl").read_text().splitlines()]
     values = [v for line in lines if line["kind"] == "rig" for v in line["values"]]
     assert len(values) == 30
