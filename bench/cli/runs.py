@@ -47,9 +47,22 @@ def runs_command(request: RunsRequest) -> int:
     with index.uncollected():
         found = _told(request)
     if not found:
-        asked = any((request.procedure, request.rig, request.failed))
-        sys.stderr.write(f"no runs in {out}{' that are as asked for' if asked else ''}\n")
+        sys.stderr.write(f"no runs in {out}{_none_such(request)}\n")
     return 0
+
+
+def _none_such(request: RunsRequest) -> str:
+    """Of what that is asked for there is none, and what there is."""
+    told = []
+    for asked, known in (
+        (request.procedure, {e.procedure for e in index.entries(request.out)}),
+        (request.rig, {e.rig for e in index.entries(request.out)}),
+    ):
+        if asked is not None and known and asked not in known:
+            near = difflib.get_close_matches(asked, known, 1)
+            told.append(f" of {asked}; there are some of {', '.join(near or sorted(known)[:8])}")
+    filtered = any((request.procedure, request.rig, request.failed))
+    return ";".join(told) or (" that are as asked for" if filtered else "")
 
 
 def _told(request: RunsRequest) -> list[IndexEntry]:

@@ -172,6 +172,11 @@ def test_runs_with_results_by_what_is_asked_for(tmp_path: Path, bench: Bench) ->
     (failed,) = json.loads(bench("runs", *out, "--failed", "--json", "--show", "K_i", "--show", "drag")[1])
     assert (failed["outcome"], failed["procedure"]) == ("FAIL", "step")
     assert failed["results"]["K_i"]["value"] == 1.0
-    assert bench("runs", *out, "--rig", "nowhere")[1:] == ("", f"no runs in {tmp_path} that are as asked for\n")
+    assert bench("runs", *out, "--rig", "nowhere")[1:] == (
+        "", f"no runs in {tmp_path} of nowhere; there are some of stand\n")  # fmt: skip
+    assert (
+        bench("runs", *out, "--procedure", "amb-calibration", "--failed")[2]
+        == f"no runs in {tmp_path} that are as asked for\n"
+    )
     status, _, err = bench("runs", *out, "--show", "K_j")
     assert (status, "such as K_i" in err) == (2, True)
