@@ -76,6 +76,13 @@ def test_an_index_of_before_there_were_visits_is_rebuilt(tmp_path: Path) -> None
     assert outcomes(tmp_path) == ["PASS"]
 
 
+def test_an_index_with_other_tables_is_rebuilt(tmp_path: Path) -> None:
+    index.add(run(tmp_path, 1))
+    with closing(sqlite3.connect(tmp_path / index.NAME)) as db, db:
+        db.execute("ALTER TABLE runs DROP COLUMN rig")
+    assert outcomes(tmp_path) == ["PASS"]
+
+
 def test_a_corrupt_run_is_skipped_with_a_message(tmp_path: Path) -> None:
     run(tmp_path, 1)
     broken = run(tmp_path, 2)

@@ -28,6 +28,7 @@ from bench.progress import PlainProgress
 from bench.record.limits import Limit, Verdict
 from bench.record.outcomes import Outcome
 from bench.record.records import SCHEMA_FILE, Record, read_record
+from bench.record.setup import certified_of
 from bench.recording import Recording
 from bench.rigfile import RigFile, load_rig
 from bench.run import reanalysis, runner
@@ -111,6 +112,23 @@ def test_settings_are_written_before_levitation(run: Run) -> None:
     order = [e["name"] for e in recording.events() if e["kind"] in ("command", "parameter")]
     assert order[:3] == ["ENABLE", "bias_i", "LEVITATE"]
     assert recording.events("parameter")[0]["value"] == 2.5
+
+
+def test_the_record_says_what_the_run_was_set_up_with(run: Run, rig: RigFile) -> None:
+    setup = run(Plan(bias_A=2.5), procedure=tiny_procedures.levitated).record.setup
+    assert setup is not None
+    assert (setup.rig_sha256, setup.firmware) == (rig.digest, "protocol 1, map version 2")
+    assert (setup.parameters["bias_i"], setup.parameters["bias_z"]) == (
+        2.5,
+        2.0,
+    )  # set by the plan; the rig file's default
+    assert setup.aliases["K_i"] == "K@inboard"
+
+
+def test_the_rig_files_numbers_are_kept_as_it_states_them(rig: RigFile) -> None:
+    found = certified_of(rig, ("masses/hanger", "sensors/i_yi_p/gain", "scatter/1", "masses/beyond/1"))
+    assert found.keys() == {"masses/hanger", "sensors/i_yi_p/gain"}  # what a run found stands in no file
+    assert (found["masses/hanger"].value, found["masses/hanger"].standard_uncertainty) == (0.25, 25e-6)
 
 
 def test_while_it_runs_the_record_says_unfinished(tmp_path: Path, run: Run) -> None:

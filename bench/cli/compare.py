@@ -96,6 +96,10 @@ def lines(found: Comparison, differ: Sequence[Differs], width: int, whole: bool 
     chance = ": by chance it is 1 in 20" if found.one_machine else ""
     more = f"; {left} more: -v" if left else ""
     yield from _folded("  ", f"|E_n| beyond 1 in {len(beyond)} of {len(found.differences)}{chance}{more}", width)
+    perhaps = sum(d.perhaps for d in found.differences) - len(beyond)
+    if perhaps:
+        told = f"{perhaps} more would be, if the bounds that each run found for itself had one cause in both: -v has that U"
+        yield from _folded("  ", told, width)
     if found.only:
         yield from _folded("  ", f"measured by one of them alone: {', '.join(found.only)}", width)
     for d in shown if whole else beyond:
@@ -168,6 +172,8 @@ def _explained(d: Difference, width: int) -> Iterator[str]:
     of_own = "; ".join(f"{c.name}, {c.size / one:.2g}: off by {c.alone:.2g} u" for c in own)
     of_both = "; ".join(f"{c.name}: by {c.alone:.2g} u" for c in same)
     yield f"  {titled(d)}, what could make the difference by itself"
+    if d.least < d.U:
+        yield f"    U is {d.U / one:.2g}, and {d.least / one:.2g} if bounds of both have one cause"
     yield from _folded("    its own in a run: ", of_own, width) if own else ()
     yield from _folded("    the same in both, had it changed: ", of_both, width) if same else ()
 
@@ -224,7 +230,7 @@ def _difference_as_data(d: Difference) -> dict[str, Any]:
     return {
         "name": d.name, "where": d.where, "unit": d.unit, "a": _end(d.a), "b": _end(d.b), "difference": d.value,
         "standard_uncertainty": d.u, "expanded_uncertainty": d.U, "interval": [d.low, d.high], "dof": d.dof, "method": d.method,
-        "en": d.en, "beyond": d.beyond, "removed": d.removed, "source": d.source, "parts": parts,
+        "en": d.en, "beyond": d.beyond, "removed": d.removed, "least": d.least, "source": d.source, "parts": parts,
     }  # fmt: skip
 
 

@@ -18,6 +18,7 @@ from bench.run.indexrow import IndexEntry, Result
 
 Shown = dict[str, dict[str, Result]]
 """Results by name and run."""
+FEW = 1000  # runs whose results are looked for one by one
 
 
 @dataclass(frozen=True)
@@ -43,11 +44,35 @@ def runs_command(request: RunsRequest) -> int:
     out = request.out
     if out.exists() and not out.is_dir():
         raise ConfigError(f"--out {out}: found a file; expected a folder of run directories")
+    with index.uncollected():
+        found = _told(request)
+    if not found:
+        sys.stderr.write(f"no runs in {out}{_none_such(request)}\n")
+    return 0
+
+
+def _none_such(request: RunsRequest) -> str:
+    """Of what that is asked for there is none, and what there is."""
+    told = []
+    for asked, known in (
+        (request.procedure, {e.procedure for e in index.entries(request.out)}),
+        (request.rig, {e.rig for e in index.entries(request.out)}),
+    ):
+        if asked is not None and known and asked not in known:
+            near = difflib.get_close_matches(asked, known, 1)
+            told.append(f" of {asked}; there are some of {', '.join(near or sorted(known)[:8])}")
+    filtered = any((request.procedure, request.rig, request.failed))
+    return ";".join(told) or (" that are as asked for" if filtered else "")
+
+
+def _told(request: RunsRequest) -> list[IndexEntry]:
+    """The runs that are asked for, printed."""
+    out = request.out
     try:
         found = index.entries(
             out, procedure=request.procedure, rig=request.rig, failed=request.failed, last=request.last
         )
-        shown = _shown(request)
+        shown = _shown(request, found)
     except (sqlite3.Error, OSError) as error:
         raise BenchError(f"{out / index.NAME}: the index cannot be used: {error}") from error
     if request.as_json:
@@ -55,76 +80,75 @@ def runs_command(request: RunsRequest) -> int:
         sys.stdout.write("\n")
     else:
         sys.stdout.writelines(_lines(found, out, shown, columns() if sys.stdout.isatty() else None))
-    if not found:
-        asked = any((request.procedure, request.rig, request.failed))
-        sys.stderr.write(f"no runs in {out}{' that are as asked for' if asked else ''}\n")
-    return 0
+    return found
 
 
-def _shown(request: RunsRequest) -> Shown:
+def _shown(request: RunsRequest, found: Sequence[IndexEntry]) -> Shown:
     """The results that are to be shown. One word may mean several names: a kind, all that is measured of it.
 
     Raises:
         ConfigError: no run has measured it.
     """
     out: Shown = {}
+    few = [e.run_id for e in found] if len(found) <= FEW else None
     for word in request.show:
-        found = index.results(
-            request.out,
-            quantity=word,
-            procedure=request.procedure,
-            rig=request.rig,
-            failed=request.failed,
-            last=request.last,
-        )
-        if not found and word not in (known := index.names(request.out)):
+        results = index.results(request.out, quantity=word, of=few)
+        if not results and not index.results(request.out, quantity=word, last=1):
+            known = index.names(request.out)
             near = difflib.get_close_matches(word, known, 3) or known[:8]
             raise ConfigError(
                 f"--show {word}: found no run in {request.out} that has measured it; expected a quantity of a record, such as "
                 f"{', '.join(near) or 'K_i'}"
             )
-        for result in found:
+        for result in results:
             out.setdefault(result.name, {})[result.run_id] = result
     return out
 
 
 def _lines(found: Sequence[IndexEntry], out: Path, shown: Shown, width: int | None) -> Iterator[str]:
     """A line each: outcome, what is shown of it, rig, which virtual one, the run directory. On a terminal that is too narrow
-    the directory goes by its name, then which rig it was is left out, and at last what is shown gets a line of its own."""
-    values = {name: {run: _value(r) for run, r in by_run.items()} for name, by_run in shown.items()}
-    told = [[by_run.get(e.run_id, "-") for by_run in values.values()] for e in found] if shown else []
-    paths = [f"{out / e.run_id}" for e in found] if width else [f"{out}/{e.run_id}" for e in found]
-    table = [
-        [e.outcome for e in found],
-        *map(list, zip(*told, strict=True)),
-        [e.rig for e in found],
-        [_which(e) for e in found],
-    ]
-    heads = ["", *shown, "", ""]
-    sizes = [max(len(head), max(map(len, column), default=0)) for head, column in zip(heads, table, strict=True)]
-    last = max(map(len, paths), default=0)
-    if width is not None and sum(sizes) + len(sizes) + last > width:
+    the directory goes by its name, then which rig it was is left out, and at last what is shown gets a line of its own.
+
+    Very many runs are of few kinds: what is the same in all runs of one is put together once."""
+    kinds = [(e.outcome, e.rig, e.served, e.seed, e.visit) for e in found]
+    ends = {kind: [kind[1], _which(*kind[2:])] for kind in set(kinds)}
+    values = [{run: _value(r) for run, r in by_run.items()} for by_run in shown.values()]
+    outcomes = max((len(kind[0]) for kind in ends), default=0)
+    sizes = [max(len(name), *map(len, column.values()), 1) for name, column in zip(shown, values, strict=True)]
+    tails = [max((len(end[k]) for end in ends.values()), default=0) for k in (0, 1)]
+    paths = [f"{out}/{e.run_id}" for e in found]
+    longest = max(map(len, paths), default=0)
+
+    def wide() -> int:
+        return 1 + outcomes + sum(sizes) + sum(tails) + len(sizes) + len(tails) + longest
+
+    if width is not None and wide() > width:
         paths = [e.run_id for e in found]
-        last = max(map(len, paths), default=0)
-        while len(sizes) > 1 + len(shown) and sum(sizes) + len(sizes) + last > width:
-            table.pop()
-            sizes.pop()
-    below = bool(shown) and width is not None and sum(sizes) + len(sizes) + last > width
-    if shown and not below:
-        yield " ".join(head.ljust(size) for head, size in zip(heads, sizes, strict=False)).rstrip() + "\n"
-    for k, path in enumerate(paths):
-        cells = [column[k].ljust(size) for column, size in zip(table, sizes, strict=True)]
-        if below:
-            yield f"{cells[0]} {path}\n"
-            yield from (f"  {name} {text[k]}\n" for name, text in zip(shown, table[1:], strict=False) if text[k] != "-")
-        else:
-            yield f"{' '.join(cells)} {path}\n"
+        longest = max(map(len, paths), default=0)
+        while tails and wide() > width:
+            tails.pop()
+    below = width is not None and bool(shown) and wide() > width
+    start = {kind: kind[0].ljust(outcomes) for kind in ends}
+    end = {kind: "".join(f"{text:{n}} " for text, n in zip(texts, tails, strict=False)) for kind, texts in ends.items()}
+    if not shown:
+        whole = {kind: f"{start[kind]} {end[kind]}" for kind in ends}
+        yield from [f"{whole[kind]}{path}\n" for kind, path in zip(kinds, paths, strict=True)]
+        return
+    if below:
+        for kind, path, e in zip(kinds, paths, found, strict=True):
+            yield f"{start[kind]} {end[kind]}{path}\n"
+            yield from (f"  {name} {v[e.run_id]}\n" for name, v in zip(shown, values, strict=True) if e.run_id in v)
+        return
+    yield " ".join([" " * outcomes, *(name.ljust(n) for name, n in zip(shown, sizes, strict=True))]).rstrip() + "\n"
+    for kind, path, e in zip(kinds, paths, found, strict=True):
+        cells = " ".join(v.get(e.run_id, "-").ljust(n) for v, n in zip(values, sizes, strict=True))
+        yield f"{start[kind]} {cells} {end[kind]}{path}\n"
 
 
-def _which(e: IndexEntry) -> str:
-    if e.served:
+def _which(served: bool, seed: int | None, visit: int | None) -> str:
+    if served:
         return "served simulation"
-    return "" if e.seed is None else f"seed {e.seed}, visit {e.visit}" if e.visit else f"seed {e.seed}"
+    return "" if seed is None else f"seed {seed}, visit {visit}" if visit else f"seed {seed}"
 
 
 def _value(r: Result) -> str:

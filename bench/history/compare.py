@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Literal
 
 from bench.errors import BenchError, ConfigError
-from bench.history.shared import Identities, identities, linear, renamed, same_machine
+from bench.history.shared import Identities, as_one, identities, linear, renamed
 from bench.record.records import Measurement, Record
 from bench.rigfile.aliases import in_full
 from bench.uncertainty import Estimate, Influence, budget, interval
@@ -64,7 +64,8 @@ class Difference:
     """Of one quantity, in `unit`. `value` is B - A, [low, high] its 95 % interval and U half of its width; u and dof None as in
     a record. `en` is None where no uncertainty is left. `source` says what it was made from: the budgets of the records; the
     recordings, where a value is not linear in its influences; `apart` where these cannot be had, and nothing is taken as
-    shared. `removed` is the share of u_A^2 + u_B^2 that the two have in common."""
+    shared. `removed` is the share of u_A^2 + u_B^2 that the two have in common. `least` is what U would be if every bound that
+    both runs found for themselves under one name had one cause: U takes them for two."""
 
     name: str
     where: str
@@ -80,6 +81,7 @@ class Difference:
     method: str
     en: float | None
     removed: float
+    least: float
     source: Source
     parts: tuple[Part, ...]
 
@@ -87,6 +89,11 @@ class Difference:
     def beyond(self) -> bool:
         """Whether the interval of the difference leaves 0 out."""
         return self.value != 0 if self.en is None else abs(self.en) > 1
+
+    @property
+    def perhaps(self) -> bool:
+        """Whether it would be, if bounds of both runs had one cause."""
+        return self.beyond or abs(self.value) > self.least
 
 
 @dataclass(frozen=True)
@@ -120,7 +127,7 @@ def compare(a: Side, b: Side, anew: Anew | None = None) -> Comparison:
     again = _anew(a, b, of, anew) if any(bent(ours[k]) or bent(theirs[k]) for k in both) else {}
     found = tuple(_difference(ours[k], theirs[k], a.record.run_id, b.record.run_id, of, again) for k in both)
     only = tuple(k for k in (*ours, *theirs) if k not in both)
-    return Comparison(a, b, same_machine(a.record, b.record), found, tuple(dict.fromkeys(only)))
+    return Comparison(a, b, of.one_machine, found, tuple(dict.fromkeys(only)))
 
 
 def _refuse(a: Side, b: Side) -> None:
@@ -195,7 +202,8 @@ def _difference(
             one, other, source = found[0], found[1], "recording"
         else:
             one, other, source = _apart(a, run_a), _apart(b, run_b), "apart"
-    return _stated(a, b, one, other, source)
+    alike = other if source == "apart" or not of.one_machine else as_one(other, one, run_b, run_a)
+    return _stated(a, b, one, other, source, least=interval(alike - one).U if alike != other else None)
 
 
 def _apart(m: Measurement, run_id: str) -> Estimate:
@@ -209,18 +217,23 @@ def _apart(m: Measurement, run_id: str) -> Estimate:
     return Estimate.of(m.value, own)
 
 
-def _stated(a: Measurement, b: Measurement, one: Estimate, other: Estimate, source: Source) -> Difference:
+def _stated(
+    a: Measurement, b: Measurement, one: Estimate, other: Estimate, source: Source, least: float | None
+) -> Difference:
     d = other - one
     found = interval(d)
-    whole = one.u**2 + other.u**2
+    drawn = (a.standard_uncertainty, b.standard_uncertainty, found.u)
+    u_a, u_b, u_d = (one.u, other.u, d.u) if source == "record" else (u or 0.0 for u in drawn)
+    whole = u_a**2 + u_b**2
     towards = d.value - found.low if d.value > 0 else found.high - d.value
     # What is left of equal numbers by rounding is no uncertainty.
-    nothing = d.u <= 1e-12 * math.sqrt(whole)
+    nothing = u_d <= 1e-12 * math.sqrt(whole)
     en = (0.0 if d.value == 0 else None) if nothing or towards <= 0 else d.value / towards
     return Difference(
         name=a.name, where=a.where, unit=a.unit, a=a, b=b, value=d.value, u=found.u, U=found.U, low=found.low, high=found.high,
         dof=found.dof if math.isfinite(found.dof) else None, method=found.method, en=en,
-        removed=1 - d.u**2 / whole if whole > 0 else 0.0, source=source, parts=tuple(_parts(one, other, d, found)),
+        removed=1 - u_d**2 / whole if whole > 0 else 0.0, source=source,
+        least=found.U if least is None else min(least, found.U), parts=tuple(_parts(one, other, d, found)),
     )  # fmt: skip
 
 

@@ -12,7 +12,7 @@ from bench.run import index
 from bench.run.indexrow import IndexEntry
 from bench.rundir import RunDirectory
 
-LAST = re.compile(r"last(?:~(\d{1,6}))?")
+LAST = re.compile(r"last(?:~[0-9]{1,6})?")
 SHOWN = 3
 
 
@@ -26,9 +26,9 @@ def run_named(word: str, root: Path, of: Sequence[RunDirectory] = ()) -> RunDire
     Raises:
         ConfigError: no such run, or several; the text says which.
     """
-    if (found := LAST.fullmatch(word)) is not None and not Path(word).exists():
-        return _last(int(found[1] or 0), word, root, of)
-    if Path(word).is_dir() or "/" in word or not root.is_dir():
+    if _by_time(word):
+        return _last(int(word[5:] or 0), word, root, of)
+    if _is_folder(word) or not root.is_dir():
         return rundir.existing(Path(word))
     fitting = [run for run in rundir.runs_in(root) if run.run_id.startswith(word)]
     exact = [run for run in fitting if run.run_id == word] or fitting
@@ -52,10 +52,23 @@ def pair_named(words: tuple[str, str], root: Path) -> tuple[RunDirectory, RunDir
     Raises:
         ConfigError: as `run_named`.
     """
-    named = {w: run_named(w, root) for w in words if LAST.fullmatch(w) is None or Path(w).exists()}
+    named = {w: run_named(w, root) for w in words if not _by_time(w)}
     context = list(named.values())
     a, b = (named.get(w) or run_named(w, root, context) for w in words)
     return a, b
+
+
+def _by_time(word: str) -> bool:
+    """Whether it is `last` or `last~N`, and no folder of that name."""
+    return LAST.fullmatch(word) is not None and not _is_folder(word)
+
+
+def _is_folder(word: str) -> bool:
+    """False too of what no path can be."""
+    try:
+        return Path(word).is_dir()
+    except (OSError, ValueError):
+        return False
 
 
 def _last(back: int, word: str, root: Path, of: Sequence[RunDirectory]) -> RunDirectory:

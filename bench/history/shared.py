@@ -9,7 +9,7 @@ density), one that was certified anew, and all those of another machine but for 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from bench.calibration import of_the_rig
@@ -17,7 +17,7 @@ from bench.findings import SIMULATED_CONTROLLER
 from bench.record.records import BudgetEntry, Measurement, Record
 from bench.rundir import NAME
 from bench.uncertainty import Estimate, Influence
-from bench.uncertainty.estimate import Deviations
+from bench.uncertainty.estimate import Array, Deviations
 
 OF_A_DAY = frozenset({"site/air_density"})
 """Numbers of the rig file that state a range for every day, within which each has its own."""
@@ -26,9 +26,11 @@ SAME = 1e-9  # of a standard uncertainty: rounding of a quotient
 
 @dataclass(frozen=True)
 class Identities:
-    """Of the influences of two runs: `standing` are those of the rig file that are the same thing in both."""
+    """Of the influences of two runs: `standing` are those of the rig file that are the same thing in both; whether the runs
+    were made on one machine."""
 
     standing: frozenset[str]
+    one_machine: bool
 
     def of(self, influence: str, run_id: str) -> str:
         """An influence's identity beyond its run."""
@@ -44,7 +46,8 @@ def identities(a: Record, b: Record) -> Identities:
     both = (
         i for i in ours.keys() & theirs.keys() if i not in OF_A_DAY and _stands(a, ours[i]) and _stands(b, theirs[i])
     )
-    return Identities(frozenset(i for i in both if _alike(ours[i], theirs[i]) and _one_thing(i, a, b, one_machine)))
+    standing = frozenset(i for i in both if _alike(ours[i], theirs[i]) and _one_thing(i, a, b, one_machine))
+    return Identities(standing, one_machine)
 
 
 def same_machine(a: Record, b: Record) -> bool:
@@ -52,7 +55,8 @@ def same_machine(a: Record, b: Record) -> bool:
     with another seed, and never the real one."""
     if (a.seed, _served(a)) != (b.seed, _served(b)):
         return False
-    return dict(a.uut) == dict(b.uut) if a.uut.get("serial") and b.uut.get("serial") else a.rig == b.rig
+    one, other = ((r.uut.get("model"), r.uut.get("serial")) for r in (a, b))
+    return one == other if one[1] and other[1] else a.rig == b.rig
 
 
 def _served(record: Record) -> bool:
@@ -113,16 +117,31 @@ def linear(m: Measurement, run_id: str, of: Identities, known: dict[str, Influen
     return Estimate(m.value, m.unit, sensitivities)
 
 
+def as_one(other: Estimate, one: Estimate, run_other: str, run_one: str) -> Estimate:
+    """`other` with the bounds (Type B) that its run found for itself taken for those of the same name that `one` has: as if
+    both had one cause. Which of them have is not known: a method on one machine may repeat an error, or make a new one."""
+    ours = {i.id: i for i in one.sensitivities if i.kind == "B"}
+
+    def rename(i: Influence) -> Influence:
+        run, _, name = i.id.partition("/")
+        mine = ours.get(f"{run_one}/{name}", i) if run == run_other and name not in OF_A_DAY else i
+        return mine if mine.distribution == i.distribution and mine.u > 0 else i
+
+    return renamed(other, rename)
+
+
 def renamed(estimate: Estimate, rename: Callable[[Influence], Influence]) -> Estimate:
-    """An estimate with other names for its influences, its model included."""
+    """An estimate by other influences, its model included; one that is more uncertain than its own acts by as much less."""
     names = {i: rename(i) for i in estimate.sensitivities}
+    scales = {i: i.u / name.u if name.u > 0 else 1.0 for i, name in names.items()}
+    sensitivities: dict[Influence, float] = {}
+    for i, c in estimate.sensitivities.items():
+        sensitivities[names[i]] = sensitivities.get(names[i], 0.0) + c * scales[i]
     model = estimate.sampler
-    sensitivities = {names[i]: c for i, c in estimate.sensitivities.items()}
     if model is None:
         return Estimate(estimate.value, estimate.unit, sensitivities)
 
-    def sampled(deviations: Deviations) -> object:
-        own: Mapping[str, object] = {i.id: deviations[name.id] for i, name in names.items()}
-        return model(own)  # type: ignore[arg-type]
+    def sampled(deviations: Deviations) -> Array:
+        return model({i.id: deviations[name.id] * scales[i] for i, name in names.items()})
 
-    return Estimate(estimate.value, estimate.unit, sensitivities, sampled)  # type: ignore[arg-type]
+    return Estimate(estimate.value, estimate.unit, sensitivities, sampled)

@@ -3,16 +3,20 @@ rebuilt. What only reads it imports nothing heavy: `bench.run.indexed` reads the
 
 from __future__ import annotations
 
+import gc
+import json
 import logging
 import os
 import sqlite3
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from bench.errors import ConfigError
-from bench.run.indexrow import IndexEntry, Result, Row
+from bench.run.indexrow import IndexEntry, MadeWith, Result, Row
 from bench.rundir import RunDirectory, runs_in
 
 NAME = "index.sqlite"
@@ -23,10 +27,11 @@ log = logging.getLogger(__name__)
 
 
 RUN_COLUMNS = ", ".join(IndexEntry._fields)
+MADE = ", ".join(MadeWith._fields)
 CALLED = "name, full, quantity, place, unit"
 TABLES = f"""
-    CREATE TABLE runs (run INTEGER PRIMARY KEY, {RUN_COLUMNS}, settings, parameters, firmware, certificates, calibrations,
-                       UNIQUE (run_id));
+    CREATE TABLE runs (run INTEGER PRIMARY KEY, {RUN_COLUMNS}, made INTEGER, UNIQUE (run_id));
+    CREATE TABLE made_with (made INTEGER PRIMARY KEY, {MADE}, UNIQUE ({MADE}));
     CREATE INDEX runs_by_time ON runs (started, run_id);
     CREATE TABLE names (number INTEGER PRIMARY KEY, {CALLED}, UNIQUE ({CALLED}));
     CREATE TABLE results (number INTEGER, run INTEGER, ordinal INTEGER, value, u, expanded, dof, p, lower, upper, verdict,
@@ -36,7 +41,6 @@ TABLES = f"""
 """Results lie together by name, and refer to runs by number: so a series of very many is read in a fraction of a second."""
 _READ = """r.run_id, procedure, rig, uut, started, seed, visit, outcome, name, quantity, place, unit, value, u, expanded, dof,
     p, lower, upper, verdict, settings, firmware, calibrations, parameters, certificates, served"""
-_NEWEST = "ORDER BY started DESC, r.run_id DESC"
 
 
 def add(run_dir: Path) -> None:
@@ -71,33 +75,38 @@ def entries(
     if not root.is_dir():
         return []
     where, values = _chosen(procedure, rig, failed)
-    query = f"SELECT {RUN_COLUMNS} FROM runs r {where} {_NEWEST}"
-    return _answered(root, lambda db: _newest(root, map(IndexEntry._make, db.execute(query, values)), last))
+    query = f"SELECT {RUN_COLUMNS} FROM runs r {where} ORDER BY started {{0}}, r.run_id {{0}}"
+    with uncollected():
+        return [IndexEntry._make(row) for row in _answered(root, lambda db: _there(db, root, query, values, last))]
 
 
 def results(
     root: Path, *, quantity: str | None = None, procedure: str | None = None, rig: str | None = None, failed: bool = False,
-    last: int | None = None,
+    last: int | None = None, of: Sequence[str] | None = None,
 ) -> list[Result]:  # fmt: skip
     """Results of the runs in `root`, oldest run first, in the record's order within a run; those deleted since left out.
 
     Args:
         quantity: a name of the record (`K_i`, `B@by the speed channel`), or by kind and place (`K@inboard`); a kind alone is
             all that is measured of it, where nothing has that very name.
-        last: the newest so many runs.
+        last: the newest so many runs that have any.
+        of: the names of some runs: of these alone.
     """
     if not root.is_dir():
         return []
+    where, values = _chosen(procedure, rig, failed, of)
+    # The newest few are found by going back through the runs, all of a series where they lie together.
+    tables = "runs r CROSS JOIN results s ON s.run = r.run" if last or of else "results s JOIN runs r USING (run)"
+    tables += " JOIN names n ON n.number = s.number JOIN made_with USING (made)"
 
-    def asked(db: sqlite3.Connection) -> list[Result]:
-        where, values = _chosen(procedure, rig, failed)
-        if quantity is not None:
-            meant = _meant(db, quantity)
-            where = f"{where or 'WHERE 1'} AND number IN ({', '.join(map(str, meant))})"
-        query = f"SELECT {_READ} FROM results JOIN runs r USING (run) JOIN names USING (number) {where} {_NEWEST}, ordinal DESC"
-        return _newest(root, (Result._make((*row, root)) for row in db.execute(query, values)), last)
+    def asked(db: sqlite3.Connection) -> list[tuple[Any, ...]]:
+        named = "" if quantity is None else f" AND s.number IN ({', '.join(map(str, _meant(db, quantity)))})"
+        query = (f"SELECT {_READ} FROM {tables} {where or 'WHERE 1'}{named} "
+                 "ORDER BY started {0}, r.run_id {0}, ordinal {0}")  # fmt: skip
+        return _there(db, root, query, values, last if of is None else len(of))
 
-    return _answered(root, asked)
+    with uncollected():
+        return [Result._make((*row, root)) for row in _answered(root, asked)]
 
 
 def names(root: Path) -> list[str]:
@@ -117,37 +126,35 @@ def _meant(db: sqlite3.Connection, asked: str) -> list[int]:
     return []
 
 
-def _chosen(procedure: str | None, rig: str | None, failed: bool) -> tuple[str, tuple[str, ...]]:
+def _chosen(
+    procedure: str | None, rig: str | None, failed: bool, of: Sequence[str] | None = None
+) -> tuple[str, tuple[str, ...]]:
     """The condition of a query for runs, with its values."""
     asked = {"procedure = ?": procedure, "rig = ?": rig}
     conditions = [text for text, value in asked.items() if value is not None]
+    values = tuple(v for v in asked.values() if v is not None)
     conditions += [f"outcome NOT IN {SOUND}"] if failed else []
-    return f"WHERE {' AND '.join(conditions)}" if conditions else "", tuple(v for v in asked.values() if v is not None)
+    if of is not None:
+        conditions.append("r.run_id IN (SELECT value FROM json_each(?))")
+        values = (*values, json.dumps(list(of)))
+    return f"WHERE {' AND '.join(conditions)}" if conditions else "", values
 
 
-def _newest(root: Path, newest_first: Iterator[T], last: int | None) -> list[T]:
-    """Rows of runs that are still there, oldest first; of so many runs at most. One listing of the folder is quicker than to
-    look for each of very many runs, and slower than to look for a few."""
-    there = _in_folder(root) if last is None else _each_looked_for(root)
-    out: list[T] = []
-    run_id, runs = "", 0
-    for row in newest_first:
-        if row[0] != run_id:  # type: ignore[index]
-            run_id = row[0]  # type: ignore[index]
-            present = there(run_id)
-            if present and (runs := runs + 1) == (last or 0) + 1 and last is not None:
+def _there(
+    db: sqlite3.Connection, root: Path, query: str, values: tuple[str, ...], last: int | None
+) -> list[tuple[Any, ...]]:
+    """Rows of runs that are still there, oldest first; of so many runs at most. `query` has `{0}` for the order. One listing of
+    the folder is quicker than to look for each of very many runs, and slower than to look for a few."""
+    if last is None:
+        present = set(os.listdir(root))
+        return [row for row in db.execute(query.format("ASC"), values) if row[0] in present]
+    kept: list[list[tuple[Any, ...]]] = []
+    for run_id, rows in groupby(db.execute(query.format("DESC"), values), key=itemgetter(0)):
+        if (root / run_id).is_dir():
+            kept.append(list(rows))
+            if len(kept) == last:
                 break
-        if present:
-            out.append(row)
-    return out[::-1]
-
-
-def _in_folder(root: Path) -> Callable[[str], bool]:
-    return set(os.listdir(root)).__contains__
-
-
-def _each_looked_for(root: Path) -> Callable[[str], bool]:
-    return lambda run_id: (root / run_id).is_dir()
+    return [row for rows in reversed(kept) for row in reversed(rows)]
 
 
 def _answered(root: Path, ask: Callable[[sqlite3.Connection], T]) -> T:
@@ -158,8 +165,9 @@ def _answered(root: Path, ask: Callable[[sqlite3.Connection], T]) -> T:
             with _opened(root) as db:
                 if db.execute("PRAGMA user_version").fetchone()[0] == VERSION:
                     return ask(db)
-        except sqlite3.OperationalError:
-            raise
+        except sqlite3.OperationalError as error:
+            if "no such" not in str(error):  # a table or column: it was made otherwise
+                raise
         except sqlite3.DatabaseError:
             pass
         rebuild(root)
@@ -173,7 +181,7 @@ def _filled(root: Path) -> list[str]:
     messages: list[str] = []
     with _opened(root) as db:
         db.execute("BEGIN IMMEDIATE")  # before the records are read: another process adds before or after, not between
-        for table in ("runs", "names", "results"):
+        for table in ("runs", "made_with", "names", "results"):
             db.execute(f"DROP TABLE IF EXISTS {table}")
         for statement in filter(str.strip, TABLES.split(";")):
             db.execute(statement)
@@ -193,12 +201,30 @@ def _put(db: sqlite3.Connection, row: Row) -> None:
     for (run,) in db.execute("SELECT run FROM runs WHERE run_id = ?", row.entry[:1]).fetchall():
         db.execute("DELETE FROM results WHERE run = ?", (run,))
         db.execute("DELETE FROM runs WHERE run = ?", (run,))
-    of_run = (None, *row.entry, *row.made_with)
+    of_run = (None, *row.entry, _kept(db, "made_with", "made", MADE, row.made_with))
     run = db.execute(f"INSERT INTO runs VALUES ({', '.join('?' * len(of_run))})", of_run).lastrowid
     for ordinal, (called, numbers) in enumerate(row.results):
-        known = db.execute(f"SELECT number FROM names WHERE ({CALLED}) = (?, ?, ?, ?, ?)", called).fetchone()
-        number = known[0] if known else db.execute("INSERT INTO names VALUES (NULL, ?, ?, ?, ?, ?)", called).lastrowid
+        number = _kept(db, "names", "number", CALLED, called)
         db.execute("INSERT INTO results VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", (number, run, ordinal, *numbers))
+
+
+def _kept(db: sqlite3.Connection, table: str, key: str, columns: str, texts: tuple[str, ...]) -> int:
+    """The number of what many rows share, which a table has once."""
+    places = ", ".join("?" * len(texts))
+    known = db.execute(f"SELECT {key} FROM {table} WHERE ({columns}) = ({places})", texts).fetchone()
+    return int(known[0] if known else db.execute(f"INSERT INTO {table} VALUES (NULL, {places})", texts).lastrowid or 0)
+
+
+@contextmanager
+def uncollected() -> Iterator[None]:
+    """Rows are tuples of numbers and texts: to look among very many of them for circles takes longer than to read them."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
 
 
 @contextmanager

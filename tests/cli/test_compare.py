@@ -9,7 +9,10 @@ from pathlib import Path
 
 import jsonschema
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from bench.errors import ConfigError
 from bench.history.naming import pair_named, run_named
 from bench.quantity import Quantity
 from bench.record.outcomes import Outcome
@@ -28,6 +31,14 @@ PART = {"name", "influence", "in_a", "in_b", "left", "alone", "shared"}
 @pytest.fixture
 def bench(capsys: pytest.CaptureFixture[str]) -> Bench:
     return bench_in_process(capsys)
+
+
+@pytest.fixture(scope="module")
+def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with one run."""
+    folder = tmp_path_factory.mktemp("runs")
+    made(folder, 1, 70.0)
+    return folder
 
 
 def made(
@@ -74,6 +85,18 @@ def test_a_run_by_path_name_beginning_and_last(tmp_path: Path, monkeypatch: pyte
     ]  # step is no run to compare with
     monkeypatch.chdir(tmp_path)
     assert run_named("last~2", Path()).path == first
+
+
+@settings(max_examples=30)
+@given(st.text(max_size=300) | st.from_regex(r"last~\d*", fullmatch=True) | st.text("amb-/.~x", max_size=400))
+def test_whatever_is_said_is_a_run_or_one_message(root: Path, word: str) -> None:
+    try:
+        found = run_named(word, root)
+    except ConfigError as error:
+        told = str(error)
+    else:
+        told = "expected" if found.record.is_file() else "nothing there"
+    assert "expected" in told
 
 
 def test_the_difference_on_the_terminal_fits_it(tmp_path: Path, bench: Bench) -> None:
@@ -128,7 +151,7 @@ def test_what_cannot_be_compared_is_said_in_one_message(tmp_path: Path, bench: B
         ((a.name, "amb-"), "whose name begins so"),
         ((a.name, "nothing"), "found no run directory of that name"),
         ((a.name, "last~40"), "expected at least 41"),
-        ((a.name, str(tmp_path / "nothing")), "found nothing; expected a run directory"),
+        ((a.name, str(tmp_path / "nothing")), "found no run directory of that name"),
     ):
         status, out, err = bench("compare", *words, "--out", str(tmp_path))
         assert (status, out) == (2, "")
@@ -149,6 +172,11 @@ def test_runs_with_results_by_what_is_asked_for(tmp_path: Path, bench: Bench) ->
     (failed,) = json.loads(bench("runs", *out, "--failed", "--json", "--show", "K_i", "--show", "drag")[1])
     assert (failed["outcome"], failed["procedure"]) == ("FAIL", "step")
     assert failed["results"]["K_i"]["value"] == 1.0
-    assert bench("runs", *out, "--rig", "nowhere")[1:] == ("", f"no runs in {tmp_path} that are as asked for\n")
+    assert bench("runs", *out, "--rig", "nowhere")[1:] == (
+        "", f"no runs in {tmp_path} of nowhere; there are some of stand\n")  # fmt: skip
+    assert (
+        bench("runs", *out, "--procedure", "amb-calibration", "--failed")[2]
+        == f"no runs in {tmp_path} that are as asked for\n"
+    )
     status, _, err = bench("runs", *out, "--show", "K_j")
     assert (status, "such as K_i" in err) == (2, True)
