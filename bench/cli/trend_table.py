@@ -72,8 +72,8 @@ def _row(number: str, when: str, value: str, u: str, ewma: str, strip: str, mark
 def _line(s: Segment, k: int, t: Told) -> str:
     averaged = None if s.chart is None or k < s.chart.baseline else float(s.chart.ewma[k - s.chart.baseline])
     when = t.when(float(s.times[k])).removeprefix("visit ")
-    numbers = [_fitting(x, t, width) for x, width in ((s.results[k].value, 11), (s.results[k].U, 9), (averaged, 9))]
-    return _row(str(k + 1), when, *numbers, _strip(s, float(s.values[k]), averaged), "".join(_marks(s, k)))
+    value, u, ewma = (_fitting(x, t, n) for x, n in ((s.results[k].value, 11), (s.results[k].U, 9), (averaged, 9)))
+    return _row(str(k + 1), when, value, u, ewma, _strip(s, float(s.values[k]), averaged), "".join(_marks(s, k)))
 
 
 def _fitting(x: float | None, t: Told, width: int) -> str:

@@ -101,6 +101,14 @@ def test_one_way_of_stiff_data(common: float, digits: int) -> None:
     assert found.residual == pytest.approx(0.1, rel=10.0**-digits)
 
 
+def test_one_way_keeps_digits_under_many_in_common() -> None:
+    """Numbers that the machine holds exactly, with 2^40 added: a mean of them has no digit left for their eighths."""
+    plain = [np.array([m - 0.125, m, m + 0.125, m + 0.25, m - 0.25]) for m in (0.0, 0.375, 0.5)]
+    shifted = one_way([g + 2.0**40 for g in plain])
+    assert shifted.f == pytest.approx(one_way(plain).f, rel=1e-12)
+    assert shifted.residual == pytest.approx(one_way(plain).residual, rel=1e-12)
+
+
 @given(st.lists(st.lists(st.floats(-1e3, 1e3), min_size=2, max_size=6), min_size=2, max_size=5))
 def test_one_way_is_that_of_scipy(groups: list[list[float]]) -> None:
     arrays = [np.array(g) for g in groups]
