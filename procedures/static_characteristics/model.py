@@ -87,7 +87,7 @@ class Terms:
     @property
     def scale(self) -> int:
         """True metres to one that is read."""
-        return self.off.stop
+        return self.off.start + self.places
 
     @property
     def count(self) -> int:
