@@ -88,7 +88,7 @@ class Terms:
     @property
     def scale(self) -> int:
         """True metres to one that is read."""
-        return self.once.start + 2 + self.places
+        return len(MAP) + len(CELLS) + PHASES * len(EACH) + 2 + self.places
 
     @property
     def count(self) -> int:

@@ -21,7 +21,7 @@ from procedures.axis_breakaway import checks, estimates, fit
 from procedures.axis_breakaway.estimates import Result
 from procedures.axis_breakaway.plan import Plan
 from procedures.axis_breakaway.procedure import check, figures, procedure, untold
-from procedures.axis_breakaway.sequence import pair, rates, step_count
+from procedures.axis_breakaway.sequence import helix, pair, step_count
 from procedures.axis_breakaway.steps import Ramp
 from procedures.stages.map_bends import doubts
 
@@ -101,7 +101,8 @@ def test_when_a_reading_changes() -> None:
     still = np.zeros(200)
     assert fit.broke_away(still) is None
     gone = still.copy()
-    gone[20], gone[120:] = 1.0, 1.0  # one flicker before
+    gone[10], gone[120:] = 1.0, 1.0  # one flicker before
+    gone[123:130] = 0.0  # and thrown back by the loop
     assert fit.broke_away(gone) == 120
     t = np.arange(200) * 1e-3
     assert fit.rise(t, 2 + 3 * t, 150) == pytest.approx(3)
@@ -130,9 +131,13 @@ def test_what_is_asked() -> None:
     assert step_count(RIG, PLAN) == len(made())
     both = pair(RIG, PLAN)
     assert both is not None
-    slow, spans = rates(both, PLAN, 0.5)
-    assert spans["x"] == pytest.approx(0.5 * PLAN.span_m)
-    assert spans["x"] / slow["x"] == pytest.approx(spans["angle"] / slow["angle"])
+    for share in (0.5, 2.0):
+        path = helix(RIG, PLAN, both, share)
+        assert path.slide["x"] / (8e-3 * path.slide["angle"]) == pytest.approx(share)  # as the surface slides
+        assert 5400 * path.ramp["x"] / F_C / (1.35 * path.ramp["angle"] / T_C) == pytest.approx(
+            share
+        )  # of what each is held by
+        assert path.slid["x"] / path.slide["x"] == pytest.approx(path.slid["angle"] / path.slide["angle"])
     assert not untold(RIG)
     assert procedure.lacking(load_rig("tsbs12"))
 
