@@ -169,20 +169,15 @@ class ConsoleOperator:
         return self._typed(axis, instrument, unit) if self._then is None else self._then.read(axis, instrument, unit)
 
     def read_cell(self, axis: str, instrument: str, unit: str) -> float:
-        """What a load cell that holds an axis shows now, SI, as `read`."""
+        """What a load cell that holds an axis shows now, as `read`."""
         return (
             self._typed(axis, instrument, unit) if self._then is None else self._then.read_cell(axis, instrument, unit)
         )
 
     def wind(self, side: Literal["above", "below"]) -> None:
-        """Ask for the load cells that hold the shaft to be wound past their place and back to it from that side.
-
-        Raises:
-            OperatorAbort: the person answered stop.
-        """
+        """Ask for the load cells that hold the shaft to be wound past their place and back from that side, as `mount` asks."""
         what = (f"Wind the load cells slowly past their place, {'up' if side == 'above' else 'down'} along and around, "
-                f"and back to "
-                f"it from {side}: along first, around last.")  # fmt: skip
+                f"and back to it from {side}: along first, around last.")  # fmt: skip
         self._confirmed(what, "they are at their place", None, _Other())
         if self._then is not None:
             self._then.wind(side)
