@@ -168,29 +168,18 @@ class ConsoleOperator:
         Raises:
             OperatorAbort: the person answered stop.
         """
-        if self._then is not None:
-            return self._then.read(axis, instrument, unit)
-        return self._typed(axis, instrument, unit)
+        return self._typed(axis, instrument, unit) if self._then is None else self._then.read(axis, instrument, unit)
 
     def read_cell(self, axis: str, instrument: str, unit: str) -> float:
-        """What a load cell that holds an axis shows now, SI, as `read`.
-
-        Raises:
-            OperatorAbort: the person answered stop.
-        """
-        if self._then is not None:
-            return self._then.read_cell(axis, instrument, unit)
-        return self._typed(axis, instrument, unit)
+        """What a load cell that holds an axis shows now, as `read`."""
+        return (
+            self._typed(axis, instrument, unit) if self._then is None else self._then.read_cell(axis, instrument, unit)
+        )
 
     def wind(self, side: Literal["above", "below"]) -> None:
-        """Ask for the load cells that hold the shaft to be wound past their place and back to it from that side.
-
-        Raises:
-            OperatorAbort: the person answered stop.
-        """
+        """Ask for the load cells that hold the shaft to be wound past their place and back from that side, as `mount` asks."""
         what = (f"Wind the load cells slowly past their place, {'up' if side == 'above' else 'down'} along and around, "
-                f"and back to "
-                f"it from {side}: along first, around last.")  # fmt: skip
+                f"and back to it from {side}: along first, around last.")  # fmt: skip
         self._confirmed(what, "they are at their place", None, _Other())
         if self._then is not None:
             self._then.wind(side)

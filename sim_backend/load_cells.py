@@ -28,7 +28,7 @@ wanders in a second (both in its own unit), and the number of the reading that i
 
 def stated(rig: RigFile) -> dict[str, Toleranced]:
     """What is drawn of each cell, by name."""
-    out = {}
+    out: dict[str, Toleranced] = {}
     for axis, cell in rig.capabilities.load_cells.items():
         out |= {f"load_cells.{axis}.gain": cell.gain, f"load_cells.{axis}.give": cell.give}
         out |= {f"load_cells.{axis}.cross.{other}": number for other, number in cell.cross.items()}

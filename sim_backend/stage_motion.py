@@ -5,7 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+import numpy.typing as npt
+
 Numbers = Mapping[str, float]
+Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -65,9 +69,9 @@ class StaticsAsked:
     """Loads of single phases on cells that hold a shaft: where encoders read `x` m and `angle` rad, the `phase` (a number) and
     its true `current` A, each (n,); the `greatest` current. `beside`: the other map's force N and torque N m of each; none."""
 
-    x: Sequence[float]
-    angle: Sequence[float]
+    x: Array
+    angle: Array
     phase: Sequence[int]
-    current: Sequence[float]
+    current: Array
     greatest: float
-    beside: tuple[Sequence[float], Sequence[float]] | None
+    beside: tuple[Array, Array] | None

@@ -132,8 +132,8 @@ def results(ramps: Sequence[Ramp], rig: RigFile, plan: Plan) -> Result:
         e = told["@".join((name, where))] + _scatter(f"{name}/{where}", u, unit, plan.repeats - 1.0)
         for influence, slope in bends.items():
             e = e + Estimate(0.0, "", {influence: float(slope[j])})
-        for axis, width in most.items():
-            e = e + _count(axis, width, float(_by_count(data, rig, plan, values, axis, width)[j] - at[j]))
+        for own, width in most.items():
+            e = e + _count(own, width, float(_by_count(data, rig, plan, values, own, width)[j] - at[j]))
         out[name, where] = Estimate(e.value, unit, e.sensitivities)
     return Result(data, {a: float(at[j]) for j, a in enumerate(data.of)}, most, at[len(data.of) :], out)
 

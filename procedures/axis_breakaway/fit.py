@@ -24,15 +24,16 @@ from procedures.axis_friction.fit import balance
 Array = npt.NDArray[np.float64]
 Take = npt.NDArray[np.intp]
 MEAN = 0.75  # of u^(1/3) for u between 0 and 1
-STAYS = 10  # samples for which a reading is to stay where it went
+STAYS = 100  # samples, of which most are to be elsewhere once an axis has begun to move
 RISE = 0.5  # of a ramp before its end, over which the rise of the force is told
 
 
 def broke_away(reading: Array) -> int | None:
-    """The first sample at which a reading (n,) is no more what it was and stays so; None: it never moves."""
-    moved = np.flatnonzero(reading != reading[0])
-    for at in moved:
-        if (reading[at : at + STAYS] != reading[0]).all():
+    """The first sample from which on a reading (n,) is mostly no more what it was; None: it never moves. A loop whose
+    derivative answers the count may throw the axis back over its edge for some samples."""
+    gone = reading != reading[0]
+    for at in np.flatnonzero(gone):
+        if gone[at : at + STAYS].mean() > 0.5:
             return int(at)
     return None
 

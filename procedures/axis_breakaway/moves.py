@@ -15,12 +15,12 @@ from procedures.axis_breakaway.sequence import (
     INTEGRATORS,
     WAYS,
     chosen,
+    helix,
     loads,
     mass,
     pair,
     place,
     ramp,
-    rates,
 )
 from procedures.stages.known_loads import put
 from procedures.stages.spread import others
@@ -83,18 +83,20 @@ def _ramps(rig: Rig, plan: Plan, record: Recorder, axis: StageAxis, repeat: int,
 def _helices(
     rig: Rig, plan: Plan, record: Recorder, both: tuple[StageAxis, StageAxis], share: float, repeat: int
 ) -> None:
-    """There and back along, turning one way there and back again, then the other way."""
-    slow, spans = rates(both, plan, share)
-    at = {a.name: place(a, plan, repeat) for a in both}
+    """Along and around at once, slid one way and then pushed the other, both ways along and around."""
+    path, at = helix(rig.file, plan, both, share), {a.name: place(a, plan, repeat) for a in both}
+    usual = {a.rate: rig.file.parameters[a.rate].default for a in both}
     for turned in WAYS:
-        signs = {both[0].name: 1, both[1].name: turned}
-        motion(rig).write({a.rate: rig.file.parameters[a.rate].default for a in both})
-        for way in (1, -1):
-            motion(rig).move({name: at[name] + way * signs[name] * spans[name] / 2 for name in at})
-        motion(rig).write({a.rate: slow[a.name] for a in both})
         for way in WAYS:
+            sign = {both[0].name: way, both[1].name: way * turned}
+            motion(rig).write(usual)
+            motion(rig).move(at)
+            motion(rig).write({a.rate: path.slide[a.name] for a in both})
+            low = {name: at[name] - sign[name] * path.slid[name] for name in at}
+            motion(rig).move(low)
+            motion(rig).write({a.rate: path.ramp[a.name] for a in both})
             rig.clock.sleep(plan.rest_s)
             with record.step(
                 HELIX, axis=both[0].name, repeat=repeat, load="", way=way, turned=turned * way, share=share
             ):
-                motion(rig).move({name: at[name] + way * signs[name] * spans[name] / 2 for name in at})
+                motion(rig).move({name: low[name] + sign[name] * path.ramped[name] for name in at})

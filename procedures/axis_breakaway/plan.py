@@ -15,6 +15,7 @@ class Plan(BenchPlan):
     ramp_rad_s: float = Field(2e-3, gt=0)
     span_m: float = Field(1.2e-3, gt=0)  # to and fro: more than both friction bands
     span_rad: float = Field(0.045, gt=0)
+    slide_rad_s: float = Field(0.02, gt=0)  # around, before a helix is ramped
     repeats: int = Field(5, ge=4)  # of everything, at as many places
     spread_m: float = Field(5e-3, ge=0)  # to each side of the middle of the travel
     mass: str = "M2"  # over a pulley

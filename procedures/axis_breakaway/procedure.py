@@ -23,7 +23,7 @@ from procedures.axis_breakaway import figures as drawn
 from procedures.axis_breakaway.estimates import Result
 from procedures.axis_breakaway.moves import acquire
 from procedures.axis_breakaway.plan import Plan
-from procedures.axis_breakaway.sequence import INTEGRATORS, chosen, loads, mass, place, ramp
+from procedures.axis_breakaway.sequence import INTEGRATORS, RADIUS, chosen, helix, loads, mass, pair, place, ramp
 from procedures.axis_breakaway.sequence import step_count as counted
 from procedures.axis_breakaway.steps import STATE, read_ramps
 from procedures.shared import assumptions
@@ -81,6 +81,11 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
             for side in (-1, 1):
                 wanted = {axis.target: place(axis, plan, repeat) + side * span / 2, axis.rate: rate}
                 yield from (f"{axis.name}: {problem}" for problem in envelope.problems_of(wanted))
+    if (both := pair(rig, plan)) is not None:
+        for share in plan.helix:
+            path = helix(rig, plan, both, max(share, 1e-3))
+            wanted = {a.target: place(a, plan, 0) - path.slid[a.name] for a in both}
+            yield from (f"helix {share:g}: {problem}" for problem in envelope.problems_of(wanted))
     if any(share <= 0 for share in plan.helix) or len(set(plan.helix)) < len(plan.helix):
         yield f"helix: found {', '.join(f'{s:g}' for s in plan.helix)}; expected shares above 0, each once"
 
@@ -104,7 +109,7 @@ def untold(rig: RigFile) -> tuple[Quantity, ...]:
     """What a rig has no axes for."""
     units = {a.unit for a in axes_of(rig).values()}
     missing = [q for q, unit in zip(MEASURES, ("m", "rad"), strict=False) if unit not in units]
-    return (*missing, *(() if {"m", "rad"} <= units else MEASURES[-1:]))
+    return (*missing, *(() if {"m", "rad"} <= units and RADIUS in rig.geometry else MEASURES[-1:]))
 
 
 def left_out(plan: Plan) -> tuple[Quantity, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 from bench.rigfile import RigFile
 from bench.rigfile.stage import StageAxis, axes_of
@@ -12,6 +13,8 @@ from procedures.stages.spread import stands, turns
 
 WAYS = (1, -1)
 INTEGRATORS = "integrators"
+RADIUS = "bearing_radius"
+HELIX_PART = 0.6  # of the span around, that a helix is ramped by
 
 
 def chosen(rig: RigFile, plan: Plan) -> tuple[StageAxis, ...]:
@@ -41,26 +44,36 @@ def place(axis: StageAxis, plan: Plan, repeat: int) -> float:
 
 
 def pair(rig: RigFile, plan: Plan) -> tuple[StageAxis, StageAxis] | None:
-    """An axis along and one around that are ramped at once; None where the plan or the rig has none."""
+    """An axis along and one around that are ramped at once; None where the plan or the rig has none, or its balls roll at no
+    radius that is known."""
     axes = chosen(rig, plan)
     along, around = ([a for a in axes if turns(a) is way] for way in (False, True))
-    return (along[0], around[0]) if plan.helix and along and around else None
+    return (along[0], around[0]) if plan.helix and along and around and RADIUS in rig.geometry else None
 
 
-def rates(both: tuple[StageAxis, StageAxis], plan: Plan, share: float) -> tuple[dict[str, float], dict[str, float]]:
-    """Rates and spans of both axes of a helix, by axis: the one whose share is greater goes by the plan's rate. Each alone
-    needs its own span to break away; shares are of these."""
+@dataclass(frozen=True)
+class Helix:
+    """Rates and ways of both axes, by axis, m or rad: of the slide before, so that both are held as the helix pulls them, and
+    of the ramp, which takes force and torque through nothing to the same on the other side."""
+
+    slide: Mapping[str, float]
+    slid: Mapping[str, float]
+    ramp: Mapping[str, float]
+    ramped: Mapping[str, float]
+
+
+def helix(rig: RigFile, plan: Plan, both: tuple[StageAxis, StageAxis], share: float) -> Helix:
+    """Force along is to be `share` times the torque, each of what one friction along the path at the bearing's radius has: it
+    goes with the surface's velocity."""
     along, around = both
-    factor = {along.name: min(share, 1.0), around.name: min(1 / share, 1.0)}
-    each = {a.name: ramp(a, plan) for a in both}
-    seconds = max(span / rate for rate, span in each.values())
-    spans = {name: span * factor[name] for name, (_, span) in each.items()}
-    return {name: span / seconds for name, span in spans.items()}, spans
-
-
-def written(axis: StageAxis, rate: float) -> Mapping[str, float]:
-    """Parameters of a ramp."""
-    return {axis.rate: rate}
+    radius = rig.geometry[RADIUS].value
+    stiffness = [rig.parameters[a.stiffness].default for a in both]
+    less = min(1.0, 1 / share)
+    slide_s, ramp_s = plan.span_rad / plan.slide_rad_s, HELIX_PART * plan.span_rad / plan.ramp_rad_s
+    slide = {along.name: share * less * radius * plan.slide_rad_s, around.name: less * plan.slide_rad_s}
+    creep = less * plan.ramp_rad_s
+    ramp = {along.name: share * creep * stiffness[1] / (stiffness[0] * radius), around.name: creep}
+    return Helix(slide, {n: v * slide_s for n, v in slide.items()}, ramp, {n: v * ramp_s for n, v in ramp.items()})
 
 
 def step_count(rig: RigFile, plan: Plan) -> int:

@@ -36,13 +36,14 @@ def _loads(r: Result, axis: int) -> Figure:
         Series(p.name, np.degrees(d[of.phase == k]), load[of.phase == k], "points") for k, p in enumerate(r.phases)
     )
     below = Figure(
-        "residuals", "Residuals", "", "angle from the aligned one / °", "beyond the formula / % of the greatest",
+        "residuals", "Residuals", "", "angle from the aligned one / °", "residual / %",
         tuple(Series(p.name, np.degrees(d[of.phase == k]), 100 * left[of.phase == k] / greatest, "points")
               for k, p in enumerate(r.phases)),
     )  # fmt: skip
     name, unit = (("Force", "H/m"), ("Torque", "H/(m rad)"))[axis]
     caption = (f"{name} by load cells over what the current makes of it, over the phase's gain "
-               f"{'and over its depth in the stator' if axis else 'towards its stator'}; the line is the formula.")  # fmt: skip
+               f"{'and over its depth in the stator' if axis else 'towards its stator'}; the line is the formula. "
+               "Residuals are shares of the greatest load.")  # fmt: skip
     label = f"{name.lower()} / ({unit})"
     return Figure(name.lower(), f"{name} of the phases", caption, "angle from the aligned one / °", label,
                   (*points, Series("formula", np.degrees(line), _curve(m, of, line, axis), "line")), below=below)  # fmt: skip

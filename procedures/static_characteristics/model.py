@@ -82,12 +82,13 @@ class Terms:
     @property
     def off(self) -> slice:
         """By how much the angle of a place is more than what is read, rad."""
-        return slice(self.once.stop, self.once.stop + self.places)
+        first = self.once.start + 2
+        return slice(first, first + self.places)
 
     @property
     def scale(self) -> int:
         """True metres to one that is read."""
-        return self.off.stop
+        return len(MAP) + len(CELLS) + PHASES * len(EACH) + 2 + self.places
 
     @property
     def count(self) -> int:

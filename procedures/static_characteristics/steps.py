@@ -55,6 +55,11 @@ class Taken:
     lost: int
     expected: int
 
+    @property
+    def where(self) -> str:
+        """As findings name it: everywhere."""
+        return ""
+
 
 def cells(rig: RigFile) -> tuple[Cell, Cell] | None:
     """Along and around; None where the rig has not got both."""

@@ -36,6 +36,6 @@ def statics(done: Simulated) -> Found:
         return
     result = done.procedure.evaluated(done.recording).result
     loads = held_loads(result)
-    asked = StaticsAsked(loads.x, loads.angle, result.rows.phase, loads.current, result.greatest, loads.beside)
+    asked = StaticsAsked(loads.x, loads.angle, result.rows.phase.tolist(), loads.current, result.greatest, loads.beside)
     for (name, where), value in of(done.recording.rig, done.drawn, asked).items():
         yield name, where, value
