@@ -20,7 +20,7 @@ __all__ = ["__version__", "open_run", "runs"]
 
 def open_run(run: str | os.PathLike[str], folder: str | os.PathLike[str] = "runs") -> Run:
     """A stored run: `run` is its directory, its recording, or its name among the runs in `folder`, of which the beginning is
-    enough where it is the only one; `last` is the newest there.
+    enough where it is the only one; `last` is the newest there, `last~1` the one before it of its procedure and rig.
 
     Raises:
         ConfigError: there is no such run, or several.

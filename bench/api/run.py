@@ -14,9 +14,9 @@ import numpy as np
 from bench.api import pages, tables
 from bench.api.capture import Capture
 from bench.api.channel import Channel
-from bench.api.finding import found_run
 from bench.cli.loading import load_procedure
 from bench.errors import ConfigError, RecordingError
+from bench.history.naming import run_named
 from bench.procedure import plans
 from bench.record.records import Record, read_record
 from bench.recording import Recording, Step
@@ -69,7 +69,8 @@ class Run:
     @classmethod
     def open(cls, run: str | os.PathLike[str], folder: str | os.PathLike[str] = "runs") -> Run:
         """See `bench.open_run`."""
-        opened = cls(found_run(run, Path(folder)).path)
+        path = Path(run)
+        opened = cls(run_named(str(path.parent if path.is_file() else path), Path(folder)).path)
         if RunDirectory(opened.path).recording.is_file():
             opened.recording  # noqa: B018 (one that cannot be read is said now)
         return opened

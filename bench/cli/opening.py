@@ -6,26 +6,19 @@ import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from bench.cli import console
-from bench.cli.safety import making_safe, may_touch
-from bench.cli.stage_safety import making_stage_safe
-from bench.cli.touching import approach, standing
+from bench.cli.openrig import rig_of
 from bench.clock import Clock, WallClock
 from bench.errors import BenchError, ConfigError
-from bench.findings import SIMULATED_CONTROLLER, Finding
+from bench.findings import Finding
 from bench.link import Link, fault_injection
 from bench.link.fault_injection import Fault
-from bench.link.health import Health
 from bench.link.session import Session, new_session
-from bench.procedure.rig import Rig
 from bench.procedure.roles import Operator
 from bench.question import Answer, Question
-from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile, linkurl
-from bench.rigfile.binding import HELD
 from bench.rigfile.registers import RegisterPort
 from bench.run.job import Connect, OpenRig, WatchedClock
 from bench.run.supervisor import Supervisor
@@ -33,10 +26,8 @@ from bench.wire import sign
 
 if TYPE_CHECKING:
     from drivers.controller import Controller
-    from drivers.fieldbus import Fieldbus
     from drivers.live_link import LiveLink
     from drivers.operator import LineOperator
-    from drivers.registerline import RegisterLine
     from sim_backend.machine import Truth
 
 logger = logging.getLogger("bench.opening")
@@ -98,7 +89,7 @@ def of_truth(
             controller.connect()
             with open_devices(rig, bank.port, controller.clock, controller.envelope) as bus:
                 hands = _operators(operator, line, controller, lambda _: console.blocking(supervisor, asking))
-                yield _opened(controller, base, bus, hands, truth.facts, injected)
+                yield rig_of(controller, base, bus, hands, truth.facts, injected)
         finally:
             machine.link.close()
 
@@ -160,7 +151,7 @@ def live(
                 )
             )
             people = _operators(operator, hands, controller, lambda clock: console.attentive(clock, asking))
-            opened = _opened(controller, base, bus, people, None, injected, lines)
+            opened = rig_of(controller, base, bus, people, None, injected, lines)
             yield replace(opened, findings=[*opened.findings, *_priority(real)])
 
     return connect
@@ -247,58 +238,3 @@ def _operators(
         person.attended = kind == "console"
         return [person, line] if line is not None else [person]
     return [line]
-
-
-def _opened(
-    controller: Controller, base: WatchedClock, bus: Fieldbus, operators: Sequence[Any], truth: Mapping[str, Any] | None,
-    injected: Sequence[Fault], lines: Mapping[str, RegisterLine] = MappingProxyType({}),
-) -> OpenRig:  # fmt: skip
-    recording: list[Any] = [controller, bus, *operators]
-    controller.companions.append(bus.pump)
-    bus.held = lambda: controller.mode in HELD
-    if bus.drive is not None:
-        bus.drive.may_run = controller.require_levitated
-
-    for person in operators:
-        person.may_touch = may_touch(controller, bus.drive)
-        person.approach, person.standing = approach(controller), standing(controller)
-
-    def attach(recorder: Recorder | None) -> None:
-        for part in recording:
-            part.recorder = recorder
-
-    def unguard() -> None:
-        controller.guarded = bus.guarded = False
-
-    def health() -> Health:
-        telemetry = controller.telemetry
-        others = {name: line.stats for name, line in lines.items()}
-        return Health(telemetry.counters, controller.link.stats, telemetry.host.drift(), telemetry.host.latest_ns,
-                      controller.watch.host_age_s, controller.requests.round_trip_ns, others,
-                      repeats=controller.requests.repeats, cut_ns=controller.cut_ns, beyond_drift=telemetry.host.beyond,
-                      unknown_s=telemetry.host.unknown_s, gained_ns=telemetry.host.rate.gained_ns,
-                      replies_wrong_length=controller.requests.wrong_length, stuck=controller.watch.stuck.found)  # fmt: skip
-
-    rig = Rig(controller.rig, controller.clock, controller, controller.rotation, operators[0], controller.telemetry.counters,
-              health, controller.link.close, bus.drive, bus.supply, bus.thermal, controller.capture,
-              controller.stage)  # fmt: skip
-    found = [fault_injection.announced(injected)] if injected else []
-    if controller.cleared:
-        found.append(
-            Finding("fault-cleared", f"fault {controller.cleared} of an earlier run was cleared", "controller")
-        )
-    if truth is None and controller.watch.simulated:
-        text = "the controller says that it is a simulated one: no machine was measured"
-        found.append(Finding(SIMULATED_CONTROLLER, text, "controller"))
-    if controller.restored:
-        text = f"parameters that an earlier host left were set to the rig file's: {', '.join(controller.restored)}"
-        found.append(Finding("parameters-restored", text, "controller"))
-    if bus.cleared:
-        found.append(Finding("fault-cleared", f"fault {bus.cleared} of an earlier run was cleared", "drive"))
-    streams = [controller.telemetry.layout, *bus.layouts]
-    steps, aftermath = (
-        making_safe(controller, base, bus.drive) if controller.stage is None else making_stage_safe(controller, base)
-    )
-    return OpenRig(
-        rig, streams, attach, unguard, steps, truth, found, controller.catch_up, aftermath, controller.identity
-    )

@@ -94,18 +94,20 @@ def test_names_that_are_none_are_answered_by_the_nearest(run: Run) -> None:
     assert list(run.to_pandas()) == list(run)
 
 
-def test_a_run_is_found_by_path_name_and_age(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_is_found_by_path_and_name(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`last` goes by the index: `test_python_pages.py`."""
     for found in (str(runs / NAME), runs / NAME / "recording.mcap"):
         assert bench.open_run(found).run_id == NAME
     for name in (NAME, "amb-c"):
         assert bench.open_run(name, str(runs)).run_id == NAME
-    assert bench.open_run("last", runs).run_id.startswith("step-")
     monkeypatch.chdir(runs.parent)
-    assert bench.open_run("last").run_id.startswith("step-")
-    with pytest.raises(ConfigError, match=r"nothing: found no run of that name in runs; expected one"):
+    assert bench.open_run("step").run_id.startswith("step-")
+    with pytest.raises(ConfigError, match=r"nothing: found no run directory of that name, here or in runs"):
         bench.open_run("nothing")
+    with pytest.raises(ConfigError, match=r"last: found no runs in runs"):
+        bench.open_run("last")
     (runs / "step-20260101T000000Z-0002").mkdir()
-    with pytest.raises(ConfigError, match=r"step: found 2 runs of that name"):
+    with pytest.raises(ConfigError, match=r"step: found 2 runs in runs whose name begins so"):
         bench.open_run("step")
     assert bench.open_run("step-20260102").run_id == "step-20260102T000000Z-0001"
 
