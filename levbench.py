@@ -26,7 +26,7 @@ def main() -> int:
         found = "\n  ".join(problems)
         sys.stderr.write(
             f"bench: packages of Levbench belong to another distribution too:\n  {found}\nexpected an environment of its own. "
-            'Next: python -m venv levbench, and levbench/bin/pip install levbench; see "Install" in the documentation\n'
+            "Next: python -m venv levbench, and install the wheel there with levbench/bin/pip (docs/how-to/install.md)\n"
         )
         return USAGE
     from bench.cli.start import main as run
