@@ -8,7 +8,6 @@ import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
-import pytest
 from packages import install, small
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -87,15 +86,11 @@ def test_an_option_that_is_taken_goes_by_a_longer_name(tmp_path: Path) -> None:
     assert 'name="levbench.seed" value="5"' in (tmp_path / "j.xml").read_text()
 
 
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [("procedure = (", "SyntaxError: '(' was never closed"), ("procedure = 3", "found procedure = a int"),
-     (small("spindown"), "procedure 'spindown' is taken twice: found levbench (procedures.spindown.procedure) and the file")],
-)  # fmt: skip
-def test_a_file_that_cannot_be_is_one_message(tmp_path: Path, text: str, expected: str) -> None:
-    (tmp_path / "look.py").write_text(text)
+def test_a_file_that_cannot_be_is_one_message(tmp_path: Path) -> None:
+    (tmp_path / "look.py").write_text(small("spindown"))
     status, out = session(tmp_path, "look.py", "--rig", "tsbs12")
     assert status == 2, out
+    expected = "procedure 'spindown' is taken twice: found levbench (procedures.spindown.procedure) and the file"
     assert expected in " ".join(out.split())
     assert "Traceback" not in out
 
