@@ -16,7 +16,7 @@ from bench.uncertainty import Estimate, Influence, propagate
 from procedures.axis_breakaway import fit
 from procedures.axis_breakaway.fit import Axis
 from procedures.axis_breakaway.plan import Plan
-from procedures.axis_breakaway.sequence import WAYS, chosen, loads, mass, pair
+from procedures.axis_breakaway.sequence import WAYS, chosen, loads, mass, pair, seen
 from procedures.axis_breakaway.steps import Ramp
 from procedures.axis_friction.fit import pseudo
 from procedures.stages.known_loads import force, load_inputs
@@ -72,7 +72,7 @@ def arrays(ramps: Sequence[Ramp], rig: RigFile, plan: Plan, late: Mapping[str, f
         down, up = ((each[s.name, 1] + each[s.name, -1]) / 2 for s in sorted(loads(rig, axis), key=lambda s: s.sign))
         axes[name] = Axis(each["", 1], each["", -1], down, up)
     both = pair(rig, plan)
-    helix = None if both is None else _helix(ramps, both, plan)
+    helix = None if both is None else _helix(ramps, both, plan, late)
     return Data(of, axes, helix, plan.helix if helix is not None else (), plan.repeats)
 
 
@@ -84,13 +84,14 @@ def _one(ramps: Sequence[Ramp], **wanted: object) -> Ramp:
     return found[0]
 
 
-def _helix(ramps: Sequence[Ramp], both: tuple[StageAxis, StageAxis], plan: Plan) -> Array:
+def _helix(ramps: Sequence[Ramp], both: tuple[StageAxis, StageAxis], plan: Plan, late: Mapping[str, float]) -> Array:
     out = np.empty((plan.repeats, len(plan.helix), 4, 2))
     for k in range(plan.repeats):
         for j, share in enumerate(plan.helix):
             for m, (way, turned) in enumerate((w, t) for w in WAYS for t in WAYS):
                 one = _one(ramps, share=share, repeat=k, way=way, turned=turned)
-                out[k, j, m] = [one.force[a.name] for a in both]
+                force = np.array([one.force[a.name] for a in both])
+                out[k, j, m] = force - np.sign(force) * [late[a.name] for a in both]
     return out
 
 
@@ -99,7 +100,7 @@ def late_by(ramps: Sequence[Ramp], rig: RigFile, plan: Plan) -> dict[str, float]
     out = {}
     for axis in chosen(rig, plan):
         rises = [abs(r.rises[axis.name]) for r in ramps if r.axis == axis.name and not r.turned]
-        number, count = rig.machine.get(MACHINE[axis.unit]), 0.0 if axis.pitch is None else axis.pitch.value
+        number, count = rig.machine.get(MACHINE[axis.unit]), seen(axis)
         out[axis.name] = fit.beyond(
             0.0 if number is None else number.value, count, float(np.median(rises)) if rises else 0.0
         )

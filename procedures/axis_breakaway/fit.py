@@ -28,10 +28,11 @@ STAYS = 100  # samples, of which most are to be elsewhere once an axis has begun
 RISE = 0.5  # of a ramp before its end, over which the rise of the force is told
 
 
-def broke_away(reading: Array) -> int | None:
-    """The first sample from which on a reading (n,) is mostly no more what it was; None: it never moves. A loop whose
-    derivative answers the count may throw the axis back over its edge for some samples."""
-    gone = reading != reading[0]
+def broke_away(reading: Array, way: float) -> int | None:
+    """The first sample from which on a reading (n,), signed as it is pushed, is mostly a `way` or more from the least so far;
+    None: it never moves. What goes on the other way at first counts not; a loop whose derivative answers the count may throw
+    the axis back over its edge for some samples."""
+    gone = reading - np.minimum.accumulate(reading) > 0.75 * way
     for at in np.flatnonzero(gone):
         if gone[at : at + STAYS].mean() > 0.5:
             return int(at)

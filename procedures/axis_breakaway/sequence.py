@@ -38,6 +38,11 @@ def ramp(axis: StageAxis, plan: Plan) -> tuple[float, float]:
     return (plan.ramp_rad_s, plan.span_rad) if turns(axis) else (plan.ramp_m_s, plan.span_m)
 
 
+def seen(axis: StageAxis) -> float:
+    """What its reading is to go before it is seen to move: a count, m or rad."""
+    return axis.pitch.value if axis.pitch is not None else 0.0
+
+
 def place(axis: StageAxis, plan: Plan, repeat: int) -> float:
     """The middle of a ramp: somewhere else in every repeat, and within a count."""
     return stands(axis, repeat, plan.repeats, plan.spread_m)

@@ -14,7 +14,8 @@ from bench.rigfile.stage import StageAxis, axes_of
 from procedures.axis_breakaway.fit import broke_away, rise
 from procedures.axis_breakaway.moves import HELIX, RAMP
 from procedures.axis_breakaway.plan import Plan
-from procedures.axis_breakaway.sequence import chosen
+from procedures.axis_breakaway.sequence import chosen, seen
+from procedures.stages import spread
 from procedures.stages.map_bends import currents, moves
 
 Array = npt.NDArray[np.float64]
@@ -73,7 +74,8 @@ def _ramp(recording: Recording[Plan], step: Step) -> Ramp:
     if len(data[STATE]) < FEWEST:
         raise AnalysisError(f"axis {axis.name}: found {len(data[STATE])} samples of a ramp; expected {FEWEST} or more")
     t, known = (data["t_ns"] - data["t_ns"][:1]) * 1e-9, rig.choices(STATE)
-    found = {name: broke_away(data[a.channel]) for name, a in watched.items()}
+    sign = {name: turned if turned and spread.turns(a) else int(labels["way"]) for name, a in watched.items()}
+    found = {name: broke_away(sign[name] * data[a.channel], seen(a)) for name, a in watched.items()}
     first = min((at for at in found.values() if at is not None), default=None)
     at = len(t) - 1 if first is None else first
     forces = {name: data[a.given or a.asked] for name, a in watched.items()}

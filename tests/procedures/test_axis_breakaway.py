@@ -99,11 +99,14 @@ def test_what_a_count_delays() -> None:
 
 def test_when_a_reading_changes() -> None:
     still = np.zeros(200)
-    assert fit.broke_away(still) is None
+    assert fit.broke_away(still, 1.0) is None
     gone = still.copy()
     gone[10], gone[120:] = 1.0, 1.0  # one flicker before
     gone[123:130] = 0.0  # and thrown back by the loop
-    assert fit.broke_away(gone) == 120
+    assert fit.broke_away(gone, 1.0) == 120
+    assert fit.broke_away(gone, 2.0) is None
+    gone[:5] = 0.5  # it goes on the other way at first
+    assert fit.broke_away(gone, 1.0) == 120
     t = np.arange(200) * 1e-3
     assert fit.rise(t, 2 + 3 * t, 150) == pytest.approx(3)
 
