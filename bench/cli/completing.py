@@ -21,7 +21,7 @@ def complete(arguments: Sequence[str]) -> int:
 
 def procedures() -> Iterable[str]:
     """As `bench list` shows them."""
-    return [entry.name for entry in catalogue.PROCEDURES]
+    return [entry.name for entry in catalogue.procedures()]
 
 
 def rigs() -> Iterable[str]:

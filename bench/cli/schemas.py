@@ -30,7 +30,7 @@ OURS = ("toml_text", "dbc_text", "path", "written_in")  # of a rig file that was
 
 def kinds() -> list[str]:
     """What there is a schema of: rig files, specs, campaigns, and the plan of each procedure."""
-    return [*FILES, *(PLAN + entry.name for entry in catalogue.PROCEDURES)]
+    return [*FILES, *(PLAN + entry.name for entry in catalogue.procedures())]
 
 
 def schema_command(kind: str, into: Path | None) -> int:
