@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from bench import display_units
 from bench.errors import Aborted, BenchError, ConfigError
-from bench.findings import SIMULATED_CONTROLLER
+from bench.findings import SIMULATED_CONTROLLER, Finding
 from bench.os_signals import delivered_to
 from bench.progress import Progress
 from bench.recording.tap import Tap
@@ -67,6 +67,7 @@ class LivePage:
         self.server, self.site = server, server.site
         self.publisher = Publisher(self.site.hub)
         self._bind = bind
+        self._progress: LiveProgress | None = None
 
     @property
     def announced(self) -> str:
@@ -84,7 +85,8 @@ class LivePage:
         """A progress display for the page too."""
         from bench.live.progress import LiveProgress
 
-        return LiveProgress(shown, self.site.hub, self.site.questions)
+        self._progress = LiveProgress(shown, self.site.hub, self.site.questions)
+        return self._progress
 
     def watched(self, job: Job, connect: Connect) -> Connect:
         """How to open the rig so that the page sees what is recorded."""
@@ -123,6 +125,8 @@ class LivePage:
 
     def end(self, result: RunResult, status: int) -> None:
         """The run is over: what came of it, and its report."""
+        if self._progress is not None:
+            self._progress.settle(Finding(f.code, f.text, f.where, f.effect) for f in result.record.findings)
         report = result.directory / "report.html"
         self.site.report = report if report.is_file() else None
         self._end({"outcome": result.outcome.value, "status": status, "reason": result.reason,

@@ -7,8 +7,9 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 
-from bench.findings import Finding
+from bench.findings import Effect, Finding
 from bench.live.hub import Hub
 from bench.live.questions import Questions
 from bench.progress import Progress
@@ -66,12 +67,18 @@ class LiveProgress:
     def found(self, look: Callable[[], Iterable[Finding]]) -> None:
         """One of the same code and place as before takes its place: its count has grown. Raises nothing."""
         try:
-            seen: Counter[tuple[str, str]] = Counter()
-            for finding in look():
-                seen[finding.code, finding.where] += 1
-                self._tell_finding(f"{finding.code}/{finding.where}/{seen[finding.code, finding.where]}", finding)
+            for key, finding in _keyed(look()):
+                self._tell_finding(key, finding)
         except Exception:
             logger.debug("findings could not be shown", exc_info=True)
+
+    def settle(self, findings: Iterable[Finding]) -> None:
+        """These stand in the record; what was told on the way and does not is said to have passed."""
+        standing = dict(_keyed(findings))
+        for key, finding in list(self._found.items()):
+            if key not in standing:
+                text = f"{finding.text} (for a while: it does not stand in the record)"
+                self._tell_finding(key, replace(finding, text=text, effect=Effect.NOTE))
 
     def _tell_finding(self, key: str, finding: Finding) -> None:
         if self._found.get(key) != finding and (key in self._found or len(self._found) < MOST):
@@ -84,3 +91,11 @@ class LiveProgress:
         left = elapsed / done * max(0, self._total - done) if self._total and done else None
         self._hub.tell("progress", {"stage": self._stage, "step": self._step, "done": done, "total": self._total or None,
                                     "elapsed_s": elapsed, "left_s": left})  # fmt: skip
+
+
+def _keyed(findings: Iterable[Finding]) -> Iterator[tuple[str, Finding]]:
+    """Each with what it is known by: its code, its place, and which of those it is."""
+    seen: Counter[tuple[str, str]] = Counter()
+    for finding in findings:
+        seen[finding.code, finding.where] += 1
+        yield f"{finding.code}/{finding.where}/{seen[finding.code, finding.where]}", finding

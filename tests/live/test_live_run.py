@@ -219,12 +219,12 @@ def test_findings_come_while_the_run_goes_on(watched: Watched) -> None:
     seen: list[Any] = []
 
     def acquire(bench: Any, plan: Any, record: Any) -> None:
-        bench.counters.lost = 3
+        bench.counters.lost, bench.counters.duplicates = 3, 2
         with record.step("look", number=0):
             bench.clock.sleep(0.2)
         with Page(watched.client) as page:
             seen.append(page.wait("finding"))
-        bench.counters.lost = 17
+        bench.counters.lost, bench.counters.duplicates = 17, 0
 
     with Page(watched.client) as page:
         watched.run(dataclasses.replace(tiny_procedures.levitated, acquire=acquire))
@@ -233,6 +233,8 @@ def test_findings_come_while_the_run_goes_on(watched: Watched) -> None:
     told = [f for f in page.kinds("finding") if f["code"] == "samples-lost"]
     assert [f["text"] for f in told] == ["3 samples were lost in 0 gaps", "17 samples were lost in 0 gaps"]
     assert len({f["id"] for f in told}) == 1
+    passed = [f for f in page.kinds("finding") if f["code"] == "frames-duplicated"]
+    assert [f["text"].partition(" (for a while")[1] for f in passed] == ["", " (for a while"]
 
 
 def content(path: Path) -> list[Any]:
