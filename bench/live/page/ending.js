@@ -4,7 +4,7 @@ import { element } from "./told.js";
 import { quantityText, shownIn, withUncertainty } from "./text.js";
 
 const $ = (id) => document.getElementById(id);
-const UNSURE = "No connection: STOP may not get through. Stop at the terminal; in danger use the emergency stop.";
+const UNSURE = "No connection: STOP may not get through. Stop at the terminal.";
 const SAYS = "STOP ends the run and makes the machine safe.";
 const ORDER = ["FAIL", "INDETERMINATE", "PASS"]; // then those that nothing judged
 const TONES = { PASS: "pass", DONE: "pass", FAIL: "fail", ERROR: "fail", ABORTED: "fail", INDETERMINATE: "open" };
@@ -28,7 +28,7 @@ export function stopView(send, changed) {
       changed();
     } else {
       const why = status ? `the run refused it (${status})${reply.error ? `: ${reply.error}` : ""}` : "nothing answers";
-      says(`STOP did not get through: ${why}. Press it again, or Ctrl-C at the terminal; in danger the emergency stop.`, true);
+      says(`STOP did not get through: ${why}. Press it again, or Ctrl-C at the terminal.`, true);
     }
   });
   return {
