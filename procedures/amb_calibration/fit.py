@@ -94,7 +94,7 @@ def fit(h: Hangings, p: Mapping[str, float], bias_A: float, masses: int, *, top_
     """
     ip, i_n = _true_currents(h.currents, p, h.pull.keys)
     design = terms_of(h, p, bias_A, masses, top_branch=top_branch)
-    solvers: Array = np.linalg.pinv(design)
+    solvers = np.asarray(np.linalg.pinv(design), np.float64)
     applied = _applied_forces(h, p, masses)
     terms = np.einsum("bafp,bap->baf", solvers, applied)
     forces = _referred(h, p, bias_A, masses, terms)

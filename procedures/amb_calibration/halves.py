@@ -5,7 +5,8 @@ positions add, differs by d = r' - r; a hanging scatters (its strap seats anew, 
 residuals have, freed of a step between the halves, so that d has twice that variance. |d| beyond Student's t at CHANCE is a
 drift, told with its 95 % interval: of current or position sensors, of the magnets, or a hanger that hangs otherwise.
 
-Sensors that cool while the machine is off drift by what can be seen and does not matter. A drift decides where K would move by
+A shaft that was turned to its angle anew stands some mrad beside it, and sensors cool while the machine is off: what can be
+seen need not matter. A drift decides where K would move by
 more than MATTERS of its own U: as a step of the force's zero, which moves K at an angle that the seam parts, or, with a mass
 on, as one of its scale, which moves K at every angle after it, whichever is more.
 """
