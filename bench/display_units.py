@@ -11,7 +11,7 @@ from bench import units
 Below = tuple[tuple[str, float], ...]
 """Units in order, each for sizes in SI below its number."""
 RESULTS: Mapping[str, Below] = {
-    "kg m": (("g mm", math.inf),), "m/(kg m)": (("um/(g mm)", math.inf),), "m": (("um", 1e-3), ("mm", 1.0)),
+    "kg m": (("g mm", math.inf),), "m/(kg m)": (("um/(g mm)", math.inf),), "m": (("um", 1e-3), ("mm", 0.05)),
     "rad/s": (("r/min", math.inf),), "s": (("us", 3e-5), ("ms", 0.1)), "rad": (("urad", 3e-4), ("deg", math.inf)),
 }  # fmt: skip
 """As the field states them. Of angles, tilts of a shaft are small ones and phases are not."""

@@ -33,8 +33,9 @@ def test_unbalance_is_told_in_g_mm_with_its_interval_limit_and_budget() -> None:
     assert record["unit"] == "kg m"  # the record itself is not touched
 
 
-def test_motion_is_told_in_um_below_a_millimetre_and_other_units_stay() -> None:
+def test_motion_is_told_in_um_below_a_millimetre_small_lengths_in_mm_and_other_units_stay() -> None:
     assert display_units.of_result("m", 12e-6) == ("um", 1e-6)
+    assert display_units.of_result("m", 8e-3) == ("mm", 1e-3)
     assert display_units.of_result("m", -0.097) == ("m", 1.0)
     assert display_units.of_result("m/(kg m)", 2.5) == ("um/(g mm)", 1.0)
     assert display_units.of_result("N/A", 23.0) == ("N/A", 1.0)
