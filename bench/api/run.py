@@ -14,7 +14,7 @@ import numpy as np
 from bench.api import pages, tables
 from bench.api.capture import Capture
 from bench.api.channel import Channel
-from bench.cli.loading import load_procedure
+from bench.cli.made_by import procedure_of
 from bench.errors import ConfigError, RecordingError
 from bench.history.naming import run_named
 from bench.procedure import plans
@@ -203,28 +203,29 @@ class Run:
             raise ConfigError(f"{self.run_id}: found no step {asked}; it has steps {', '.join(known) or 'of no kind'}")
         return found
 
-    def analyse(self, plan: Mapping[str, Any] | None = None) -> Analysis:
+    def analyse(self, plan: Mapping[str, Any] | None = None, procedure: str | os.PathLike[str] = "") -> Analysis:
         """Analyse the recording with today's Levbench; nothing is written (`bench analyse` writes).
 
         Args:
             plan: settings of the plan, as a plan file has them, to be other ones in this analysis. Those that say what was
                 done (how many angles, how long) contradict the recording when they are changed.
+            procedure: the file of the run's procedure, where it was one in a file.
 
         Raises:
             ConfigError: no such setting or value, or a procedure that this version does not have.
             RecordingError: there is no recording, or it cannot be read.
         """
-        procedure = load_procedure(self.recording.procedure)
+        found = procedure_of(RunDirectory(self.path), self.recording.procedure, os.fspath(procedure))
         settings: dict[str, Any] = {}
         if plan:
-            made = plans.assemble(procedure.plan, ("plan", {**self.recording.plan_dict, **plan}))
+            made = plans.assemble(found.plan, ("plan", {**self.recording.plan_dict, **plan}))
             settings = made.model_dump(mode="json")
-        recording = Recording.open(self.recording.path, procedure.plan, settings)
+        recording = Recording.open(self.recording.path, found.plan, settings)
         try:
             original: Record | None = self.record
         except ConfigError:
             original = None
-        return Analysis(reanalysis.reanalysed(RunDirectory(self.path), procedure, recording, original))
+        return Analysis(reanalysis.reanalysed(RunDirectory(self.path), found, recording, original))
 
     def __repr__(self) -> str:
         try:
