@@ -184,6 +184,7 @@ for of_stored_runs in (
     stored.analyse,
     stored.report,
     stored.runs,
+    stored.show,
     stored.compare,
     stored.trend,
     stored.export,

@@ -23,6 +23,7 @@ from bench.run.job import Connect, Job, OpenRig
 if TYPE_CHECKING:
     from bench.live.progress import LiveProgress
     from bench.live.server import LiveServer
+    from bench.live.site import Site
     from bench.record.records import Measurement
     from bench.recording.recorder import Recorder
     from bench.run.runner import RunResult
@@ -61,10 +62,10 @@ def asked_page(live: bool, port: int | None, bind: str | None) -> PageRequest | 
 class LivePage:
     """The page of one run, while it is served."""
 
-    def __init__(self, server: LiveServer, bind: str) -> None:
+    def __init__(self, server: LiveServer, site: Site, bind: str) -> None:
         from bench.live.publisher import Publisher
 
-        self.server, self.site = server, server.site
+        self.server, self.site = server, site
         self.publisher = Publisher(self.site.hub)
         self._bind = bind
         self._progress: LiveProgress | None = None
@@ -72,14 +73,7 @@ class LivePage:
     @property
     def announced(self) -> str:
         """A line with the address, which holds the token."""
-        port = self.server.port
-        if self._bind in EVERYWHERE:
-            return (f"live page: {self.site.url(LOOPBACK, port)} and, without encryption, at every address of this computer: "
-                    "whoever can read the network can read its token")  # fmt: skip
-        line = f"live page: {self.site.url(self._bind, port)}"
-        return (
-            line if self.server.local else f"{line} without encryption: whoever can read the network can read its token"
-        )
+        return announced(self.server, self._bind)
 
     def progress(self, shown: Progress) -> LiveProgress:
         """A progress display for the page too."""
@@ -131,7 +125,7 @@ class LivePage:
         self.site.report = report if report.is_file() else None
         self._end({"outcome": result.outcome.value, "status": status, "reason": result.reason,
                    "report": "/report.html" if self.site.report else None, "folder": str(result.directory),
-                   "results": [_result(m) for m in result.record.measurements]})  # fmt: skip
+                   "results": [result_of(m) for m in result.record.measurements]})  # fmt: skip
 
     def failed(self, error: BenchError) -> None:
         """There was no run, or it ended without a record."""
@@ -163,7 +157,8 @@ class LivePage:
                 time.sleep(LOOK_S)
 
 
-def _result(m: Measurement) -> dict[str, Any]:
+def result_of(m: Measurement) -> dict[str, Any]:
+    """A result as pages are told it: in its SI unit, with the unit to show it in."""
     half = m.expanded_uncertainty
     if half is None and m.interval is not None:
         half = (m.interval[1] - m.interval[0]) / 2
@@ -171,6 +166,18 @@ def _result(m: Measurement) -> dict[str, Any]:
     symbol, factor = display_units.of_result(m.unit, m.value or half or 0.0)
     return {"name": name, "value": m.value, "U": half, "unit": m.unit, "display_unit": symbol, "factor": factor,
             "verdict": m.verdict.value}  # fmt: skip
+
+
+def announced(server: LiveServer, bind: str, what: str = "live page") -> str:
+    """A line with the address, which holds the token."""
+    unsafe = "without encryption"
+    seen = "whoever can read the network can read its token"
+    if bind in EVERYWHERE:
+        return (
+            f"{what}: {server.site.url(LOOPBACK, server.port)} and, {unsafe}, at every address of this computer: {seen}"
+        )
+    line = f"{what}: {server.site.url(bind, server.port)}"
+    return line if server.local else f"{line} {unsafe}: {seen}"
 
 
 @contextmanager
@@ -187,7 +194,7 @@ def opened(asked: PageRequest, stop: Callable[[str], None] | None) -> Iterator[L
 
     hub = Hub()
     site = Site(hub, Questions(hub.tell), stop, named="" if asked.bind in EVERYWHERE else asked.bind)
-    page = LivePage(LiveServer(site, asked.bind, asked.port), asked.bind)
+    page = LivePage(LiveServer(site, asked.bind, asked.port), site, asked.bind)
     with page.server.serving(), page.publisher.publishing():
         try:
             yield page

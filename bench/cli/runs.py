@@ -111,7 +111,7 @@ def _lines(found: Sequence[IndexEntry], out: Path, shown: Shown, width: int | No
 
     Very many runs are of few kinds: what is the same in all runs of one is put together once."""
     kinds = [(e.outcome, e.rig, e.served, e.seed, e.visit) for e in found]
-    ends = {kind: [kind[1], _which(*kind[2:])] for kind in set(kinds)}
+    ends = {kind: [kind[1], which_machine(*kind[2:])] for kind in set(kinds)}
     values = [{run: _value(r) for run, r in by_run.items()} for by_run in shown.values()]
     outcomes = max((len(kind[0]) for kind in ends), default=0)
     sizes = [max(len(name), *map(len, column.values()), 1) for name, column in zip(shown, values, strict=True)]
@@ -145,7 +145,8 @@ def _lines(found: Sequence[IndexEntry], out: Path, shown: Shown, width: int | No
         yield f"{start[kind]} {cells} {end[kind]}{path}\n"
 
 
-def _which(served: bool, seed: int | None, visit: int | None) -> str:
+def which_machine(served: bool, seed: int | None, visit: int | None) -> str:
+    """Which virtual machine it was; "" is a real one."""
     if served:
         return "served simulation"
     return "" if seed is None else f"seed {seed}, visit {visit}" if visit else f"seed {seed}"

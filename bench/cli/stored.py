@@ -74,6 +74,23 @@ def runs(
     return runs_command(RunsRequest(out, procedure, rig, failed, last, tuple(show or ()), as_json))
 
 
+def show(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of the run directories.")] = Path("runs"),
+    port: Annotated[int, typer.Option("--port", min=0, max=65535, help="Of the page; default any free one.")] = 0,
+    bind: Annotated[
+        str, typer.Option("--bind", metavar="ADDR", help="Address of the page; default this computer alone.")
+    ] = "127.0.0.1",
+) -> int:
+    """Show the runs of a folder on a page: results, reports and trends. Its address is printed.
+
+    Changes nothing; ends on Ctrl-C.
+    """
+    from bench.cli.live import PageRequest
+    from bench.cli.show import show_command
+
+    return show_command(folder, PageRequest(port, bind))
+
+
 def compare(
     a: Annotated[
         str, typer.Argument(metavar="A", help="A run directory, a run's name or its beginning, last, last~1.")

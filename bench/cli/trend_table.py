@@ -25,17 +25,29 @@ CHANCES = 60  # runs after the baseline up to which the chance of a false alarm 
 
 def text(trend: Trend, older: bool) -> str:
     """All of it; `older`: there are runs of before that were not asked for."""
-    t = told(trend)
-    lines = [*_head(trend, t, older)]
-    for k, (segment, step) in enumerate(zip(trend.segments, [None, *steps(trend)], strict=True)):
-        lines += ["", *_segment(segment, step, k, trend, t)]
-    used = {mark for segment in trend.segments for k in range(len(segment.results)) for mark in _marks(segment, k)}
-    if used:
-        lines += ["", *_folded("marks: " + ", ".join(f"{m} {said}" for m, said in MARKS.items() if m in used), 0)]
+    lines: list[str] = []
+    for kind, said in parts(trend, older):
+        lines += [""] if kind in ("segment", "marks") else []
+        lines += said.split("\n") if kind == "rows" else _folded(said, 2 if kind == "note" else 0)
     return "\n".join(lines) + "\n"
 
 
-def _head(trend: Trend, t: Told, older: bool) -> list[str]:
+def parts(trend: Trend, older: bool) -> Iterator[tuple[str, str]]:
+    """What is told, by kind: `head`, and of each segment `segment` (how it differs from the one before, or nothing), `rows` in
+    columns, and each `note` on it; at the end `marks`."""
+    t = told(trend)
+    yield from (("head", said) for said in _head(trend, t, older))
+    many = len(trend.segments) > 1
+    for k, (segment, step) in enumerate(zip(trend.segments, [None, *steps(trend)], strict=True)):
+        yield "segment", _change(segment, step, k, t) if many else ""
+        yield "rows", "\n".join(_rows(segment, t))
+        yield from (("note", said) for said in _said(segment, t, trend.weight))
+    used = {mark for segment in trend.segments for k in range(len(segment.results)) for mark in _marks(segment, k)}
+    if used:
+        yield "marks", "marks: " + ", ".join(f"{m} {said}" for m, said in MARKS.items() if m in used)
+
+
+def _head(trend: Trend, t: Told, older: bool) -> tuple[str, str]:
     first, times = trend.history.results[0], trend.history.times
     of = f"{trend.name} of {first.procedure} on {machine(first)}"
     span = f"{len(times)} runs, {t.when(times[0])} to {t.when(times[-1])}"
@@ -44,25 +56,26 @@ def _head(trend: Trend, t: Told, older: bool) -> list[str]:
         f"{trend.history.broken} without a value left out" if trend.history.broken else "",
         f"{trend.history.repeated} repeated simulations left out" if trend.history.repeated else "",
     ]
-    return _folded(of, 0) + _folded("; ".join(x for x in (span, *left) if x), 0)
+    return of, "; ".join(x for x in (span, *left) if x)
 
 
-def _segment(s: Segment, step: Step | None, position: int, trend: Trend, t: Told) -> Iterator[str]:
-    if len(trend.segments) > 1:
-        changed = f": new {', '.join(s.changed)}" if s.changed else ""
-        by = (
-            ""
-            if step is None
-            else f"; mean {_signed(step.change, t, 1)} ± {t.with_unit(step.half, 1)} against the one before"
-        )
-        yield from _folded(f"segment {position + 1}{changed}{by}", 0)
+def _change(s: Segment, step: Step | None, position: int, t: Told) -> str:
+    changed = f": new {', '.join(s.changed)}" if s.changed else ""
+    by = (
+        ""
+        if step is None
+        else f"; mean {_signed(step.change, t, 1)} ± {t.with_unit(step.half, 1)} against the one before"
+    )
+    return f"segment {position + 1}{changed}{by}"
+
+
+def _rows(s: Segment, t: Told) -> Iterator[str]:
     unit = f", {t.unit}" if t.unit else ""
     yield _row("no", "visit" if t.axis == "visit" else "date, UTC", f"value{unit}", "U", "EWMA", _heading(s), "")
     for k in range(len(s.results)):
         if s.chart is not None and k == s.chart.baseline:
             yield _row("", "", "", "", "", f"{'-' * STRIP}", "")
         yield _line(s, k, t)
-    yield from (line for said in _said(s, t, trend.weight) for line in _folded(said, 2))
 
 
 def _row(number: str, when: str, value: str, u: str, ewma: str, strip: str, marks: str) -> str:

@@ -21,13 +21,13 @@ class Asset:
     content: bytes
 
 
-def page_assets() -> dict[str, Asset]:
-    """By path: all files of the page whose type is known; `/` is `index.html`."""
+def page_assets(first: str = "index.html") -> dict[str, Asset]:
+    """By path: all files of the page whose type is known; `/` is `first`, the one page among them."""
     found: dict[str, Asset] = {}
     for file in resources.files("bench.live").joinpath("page").iterdir():
         suffix = "." + file.name.rpartition(".")[2]
-        if suffix in TYPES and file.is_file():
+        if suffix in TYPES and file.is_file() and (suffix != ".html" or file.name == first):
             found[f"/{file.name}"] = Asset(TYPES[suffix], file.read_bytes())
-    if "/index.html" in found:
-        found["/"] = found["/index.html"]
+    if f"/{first}" in found:
+        found["/"] = found[f"/{first}"]
     return found

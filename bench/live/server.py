@@ -10,14 +10,15 @@ import socket
 import socketserver
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
 from typing import Any
 
 from bench.errors import ConfigError
+from bench.live.exchange import Exchange
 from bench.live.handler import Handler
-from bench.live.site import Site
+from bench.live.site import Served
 
 logger = logging.getLogger("bench.live")
 CLIENTS = 48  # at once
@@ -36,16 +37,24 @@ class LiveServer(socketserver.ThreadingMixIn, socketserver.TCPServer):
     allow_reuse_address = True
     request_queue_size = 32
 
-    def __init__(self, site: Site, address: str, port: int) -> None:
+    def __init__(
+        self,
+        site: Served,
+        address: str,
+        port: int,
+        handler: Callable[..., Exchange] = Handler,
+        options: str = "--live-",
+    ) -> None:
+        """`handler` is that of the site's requests; address and port were asked for by `options`bind and `options`port."""
         self.site = site
         self._open: set[socket.socket] = set()
         self._places = threading.BoundedSemaphore(CLIENTS)
-        family, where = _resolved(address, port)
+        family, where = _resolved(address, port, options)
         self.address_family = family
         try:
-            super().__init__(where, partial(Handler, site))
+            super().__init__(where, partial(handler, site))
         except OSError as error:
-            raise ConfigError(_why(error, address, port)) from error
+            raise ConfigError(_why(error, address, port, options)) from error
 
     @property
     def port(self) -> int:
@@ -88,7 +97,7 @@ class LiveServer(socketserver.ThreadingMixIn, socketserver.TCPServer):
         try:
             yield self
         finally:
-            self.site.hub.close()
+            self.site.close()
             self._drained()
             self.shutdown()
             self.server_close()
@@ -100,24 +109,24 @@ class LiveServer(socketserver.ThreadingMixIn, socketserver.TCPServer):
     def _drained(self) -> None:
         """Let pages have what they have not had yet; one that takes nothing is not waited for."""
         until = time.monotonic() + DRAIN_S
-        while self.site.hub.readers and time.monotonic() < until:
+        while self.site.followed and time.monotonic() < until:
             time.sleep(0.01)
 
 
-def _resolved(address: str, port: int) -> tuple[socket.AddressFamily, Any]:
+def _resolved(address: str, port: int, options: str) -> tuple[socket.AddressFamily, Any]:
     try:
         found = socket.getaddrinfo(address, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0]
     except (OSError, UnicodeError) as error:
-        raise ConfigError(f"--live-bind {address}: found no such address ({error}); expected one of this host, such as "
+        raise ConfigError(f"{options}bind {address}: found no such address ({error}); expected one of this host, such as "
                           "127.0.0.1 or 0.0.0.0") from error  # fmt: skip
     return found[0], found[4]
 
 
-def _why(error: OSError, address: str, port: int) -> str:
+def _why(error: OSError, address: str, port: int, options: str) -> str:
     if error.errno == errno.EADDRINUSE:
-        return (f"--live-port {port}: found it in use on {address}; expected a free port; nothing was started. Next: end "
-                "what uses it, give another, or leave --live-port out for any free one")  # fmt: skip
+        return (f"{options}port {port}: found it in use on {address}; expected a free port; nothing was started. Next: end "
+                "what uses it, give another, or leave {options}port out for any free one")  # fmt: skip
     if error.errno == errno.EADDRNOTAVAIL:
-        return (f"--live-bind {address}: found no such address on this host; expected one of its own, such as 127.0.0.1 or "
+        return (f"{options}bind {address}: found no such address on this host; expected one of its own, such as 127.0.0.1 or "
                 "0.0.0.0; nothing was started")  # fmt: skip
-    return f"--live: cannot listen on {address}, port {port}: {error.strerror or error}; nothing was started"
+    return f"{options}bind {address}: cannot listen on port {port}: {error.strerror or error}; nothing was started"

@@ -16,7 +16,7 @@ from live_client import Client, Page
 from made_run import MadeRun
 
 from bench.errors import ConfigError
-from bench.live import handler, site
+from bench.live import exchange, site
 from bench.live.gate import check_host
 from bench.question import Answer, Choice, Question
 
@@ -295,7 +295,7 @@ def test_a_client_that_says_nothing_holds_only_its_place(made: MadeRun, own: Cli
 
 
 def test_a_request_that_dribbles_is_given_up(made: MadeRun, own: Client, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(handler, "HEAD_S", 0.3)
+    monkeypatch.setattr(exchange, "HEAD_S", 0.3)
     with socket.create_connection((own.host, own.port), timeout=20.0) as connection:
         connection.sendall(b"GET / HT")
         assert connection.recv(100) == b""

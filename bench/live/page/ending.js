@@ -7,7 +7,7 @@ const $ = (id) => document.getElementById(id);
 const UNSURE = "No connection: STOP may not get through. Stop at the terminal.";
 const SAYS = "STOP ends the run and makes the machine safe.";
 const ORDER = ["FAIL", "INDETERMINATE", "PASS"]; // then those that nothing judged
-const TONES = { PASS: "pass", DONE: "pass", FAIL: "fail", ERROR: "fail", ABORTED: "fail", INDETERMINATE: "open" };
+export const TONES = { PASS: "pass", DONE: "pass", FAIL: "fail", ERROR: "fail", ABORTED: "fail", INDETERMINATE: "open" };
 
 /** The STOP button; `send()` posts. It can be pressed again until the run has taken it. */
 export function stopView(send, changed) {
@@ -53,7 +53,8 @@ function verdictOf({ verdict }) {
   return (verdict || "").toUpperCase();
 }
 
-function resultRow(result) {
+/** A row of name, value, U, unit and verdict. */
+export function resultRow(result) {
   const row = element("tr");
   const { unit, factor, offset } = shownIn(result);
   const size = (x) => (typeof x === "number" ? x / factor : null);

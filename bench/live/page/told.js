@@ -67,7 +67,7 @@ export function findingsView() {
   };
 }
 
-function findingNode({ code, text, where, effect }) {
+export function findingNode({ code, text, where, effect }) {
   const node = element("div", `finding ${effect in LOUD ? effect : "note"}`);
   node.append(element("p", "", text));
   const small = element("p", "small soft");
