@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime
 import json
 import os
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -299,7 +300,7 @@ def test_the_commands_take_it_by_name_and_by_path(folder: Path, capsys: pytest.C
         assert main(["check", rig]) == 0
         assert "no problems" in capsys.readouterr().out
         assert main(["list", "--rig", rig]) == 0
-        assert "amb-calibration     yes" in capsys.readouterr().out
+        assert re.search(r"amb-calibration +yes", capsys.readouterr().out)
 
 
 BARE = st.from_regex(r"[A-Za-z0-9_-]{1,6}", fullmatch=True)

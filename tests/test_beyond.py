@@ -12,7 +12,7 @@ from bench.rigfile.check import check_rig
 
 ROOT = Path(__file__).resolve().parents[1]
 STRANGERS, RIGS = ROOT / "tests/strangers", ROOT / "rigs"
-SOUND = [*sorted(RIGS.glob("*.toml")), *sorted(ROOT.glob("examples/*/*.toml")),
+SOUND = [*sorted(RIGS.glob("*.toml")), *(p for p in sorted(ROOT.glob("examples/*/*.toml")) if p.name != "pyproject.toml"),
          *(p for p in sorted(STRANGERS.glob("*.toml")) if p.stem != "solo")]  # fmt: skip
 
 

@@ -53,7 +53,9 @@ def test_a_disk_that_fills_up_ends_the_run_and_is_in_its_record(tmp_path: Path) 
     found = {f["code"]: f["text"] for f in record["findings"]}
     assert found["recording-failed"].startswith(f"recording {folder / 'recording.mcap'}: cannot be written: {NEXT}")
     assert "Traceback" not in done.stderr
-    assert sorted(p.name for p in folder.iterdir()) == ["record.json", "recording.mcap", "run.log", "truth.json"]
+    assert sorted(p.name for p in folder.iterdir()) == [
+        "asked.json", "record.json", "recording.mcap", "run.log", "truth.json",
+    ]  # fmt: skip
 
 
 def test_a_disk_that_is_full_starts_nothing(tmp_path: Path) -> None:

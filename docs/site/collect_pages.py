@@ -48,7 +48,11 @@ def _list(folder: Path) -> None:
     if (index := folder / "README.md").exists():
         return
     lines = [f"- [{_title(page)}]({page.name})" for page in sorted(folder.glob("*.md"))]
-    lines += [f"- [{inner.name}]({inner.name}/README.md)" for inner in sorted(folder.iterdir()) if inner.is_dir()]
+    lines += [
+        f"- [{inner.name}]({inner.name}/README.md)"
+        for inner in sorted(folder.iterdir())
+        if (inner / "README.md").exists()
+    ]
     index.write_text("\n".join([f"# {folder.name.capitalize()}", "", *lines, ""]), encoding="utf-8")
 
 

@@ -65,7 +65,7 @@ def test_commands_parameters_and_captures_are_those_of_the_machines_own_map() ->
     for rig in (load_rig("amb5dof"), RENAMED):
         stand = Stand(rig)
         c = stand.controller
-        assert c.serial == 0
+        assert c.identity["serial"] == 0
         c.enable()
         c.set("bias", 0.6)
         assert c.get("bias") == pytest.approx(0.6)

@@ -37,9 +37,10 @@ class WatchedRig(endpoint.SimulatedRig):
     made: WatchedRig
 
     def __init__(
-        self, rig: RigFile, truth: Truth, session: int = 1, given: tuple[Fault, ...] = (), substeps: int = 2
+        self, rig: RigFile, truth: Truth, session: int = 1, given: tuple[Fault, ...] = (), substeps: int = 2,
+        start_ns: int = endpoint.EPOCH_NS,
     ) -> None:  # fmt: skip
-        super().__init__(rig, truth, session, given, substeps)
+        super().__init__(rig, truth, session, given, substeps, start_ns)
         WatchedRig.made = self
         self.begin = self.now_ns() + round(given[0].start_s * 1e9)  # the host's first frame comes in the first slice
         self.down_s = self.rest_s = float("inf")
