@@ -47,5 +47,5 @@ def _circle(r: Result) -> Figure:
     caption = ("Both at once: force by the controller's map along and around where the first reading changes, as shares "
                "of what each "
                "axis breaks away at alone.")  # fmt: skip
-    return Figure("circle", "Breakaway where both axes are pushed", caption, f"{names[0]}, share of its breakaway",
-                  f"{names[1]}, share of its breakaway", series)  # fmt: skip
+    return Figure("circle", "Breakaway where both axes are pushed", caption, f"{names[0]}, share",
+                  f"{names[1]}, share", series)  # fmt: skip
