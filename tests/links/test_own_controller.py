@@ -3,7 +3,7 @@ through that map and through the native one, from the very same samples."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -60,6 +60,9 @@ class Twice:
     def event(self, kind: str, **data: Any) -> None:
         for recorder in self.recorders:
             recorder.event(kind, **data)
+
+    def completed(self, kind: str) -> tuple[Mapping[str, Any], ...]:
+        return self.recorders[0].completed(kind)
 
 
 class Bench:
