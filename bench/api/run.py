@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -27,8 +27,34 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+class Recorded(Protocol):
+    """What has a record."""
+
+    @property
+    def record(self) -> Record: ...
+
+
+class Judged:
+    """What a record says, as tables."""
+
+    @property
+    def outcome(self: Recorded) -> str:
+        """PASS, DONE, FAIL, INDETERMINATE, ERROR or ABORTED."""
+        return self.record.outcome.value
+
+    @property
+    def results(self: Recorded) -> pd.DataFrame:
+        """The measured quantities by name, in SI: `value`, `U`, `unit` and more."""
+        return tables.results_of(self.record)
+
+    @property
+    def findings(self: Recorded) -> pd.DataFrame:
+        """What was noticed: `code`, `effect`, `text`, `where`, `concerns`."""
+        return tables.findings_of(self.record)
+
+
 @dataclass(frozen=True)
-class Analysis:
+class Analysis(Judged):
     """What an analysis says.
 
     Attributes:
@@ -37,27 +63,12 @@ class Analysis:
 
     record: Record
 
-    @property
-    def outcome(self) -> str:
-        """PASS, DONE, FAIL, INDETERMINATE, ERROR or ABORTED."""
-        return self.record.outcome.value
-
-    @property
-    def results(self) -> pd.DataFrame:
-        """The measured quantities by name, in SI: `value`, `U`, `unit` and more."""
-        return tables.results_of(self.record)
-
-    @property
-    def findings(self) -> pd.DataFrame:
-        """What was noticed: `code`, `effect`, `text`, `where`, `concerns`."""
-        return tables.findings_of(self.record)
-
     def _repr_html_(self) -> str:
         return pages.of_record(self.record)
 
 
 @dataclass(frozen=True)
-class Run:
+class Run(Judged):
     """A run in its directory. `run["pos_x"]` is a channel over the whole of it.
 
     Attributes:
@@ -102,21 +113,6 @@ class Run:
                 f"{self.path}: holds no recording.mcap; expected one. The run ended before it could record"
             )
         return Recording.open(path)
-
-    @property
-    def outcome(self) -> str:
-        """PASS, DONE, FAIL, INDETERMINATE, ERROR or ABORTED."""
-        return self.record.outcome.value
-
-    @property
-    def results(self) -> pd.DataFrame:
-        """The measured quantities by name, in SI: `value`, `U`, `unit` and more."""
-        return tables.results_of(self.record)
-
-    @property
-    def findings(self) -> pd.DataFrame:
-        """What was noticed: `code`, `effect`, `text`, `where`, `concerns`."""
-        return tables.findings_of(self.record)
 
     @property
     def channels(self) -> pd.DataFrame:

@@ -16,7 +16,9 @@ it.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -54,6 +56,19 @@ class Rows:
     aligned: Array
     poles: int
     noise: float = 0.0
+
+
+class Phases(Protocol):
+    """Six phases, each (6,): `side`, `stator` and `aligned`, as `Rows` has them; the rotor's `poles`."""
+
+    @property
+    def side(self) -> Array: ...
+    @property
+    def stator(self) -> Index: ...
+    @property
+    def aligned(self) -> Array: ...
+    @property
+    def poles(self) -> int: ...
 
 
 @dataclass(frozen=True)
@@ -123,18 +138,25 @@ def places(t: Array, rows: Rows) -> tuple[Array, Array]:
     return rows.x * t[at.scale] + t[at.along], turned
 
 
-def inductance(t: Array, rows: Rows, x: Array, angle: Array, k: Index) -> tuple[Array, Array, Array]:
-    """G H of phases `k` at places `x` m and `angle` rad (which go with `k`), dG/da and dG/dx, by the terms."""
-    m, at = dict(zip(MAP, t, strict=False)), Terms(len(rows.x))
-    side = rows.side[k]
-    d = angle - rows.aligned[k] - np.where(rows.stator[k] == 0, m["zero_1"], m["zero_2"])
+def mapped(
+    m: Mapping[str, float], gain: Array, of: Phases, k: Index, x: Array, angle: Array
+) -> tuple[Array, Array, Array]:
+    """G H of phases `k` at places `x` m and `angle` rad (which go with `k`), dG/da and dG/dx, by the map's terms `m` and each
+    phase's `gain`."""
+    side = of.side[k]
+    d = angle - of.aligned[k] - np.where(of.stator[k] == 0, m["zero_1"], m["zero_2"])
     o = m["overlap"] + side * (x - m["centre"])
     over, rise = overlapped(o, m["length"], m["fringe"]), advance(o, m["length"], m["fringe"])
-    lam, bend = angular(d, m["unaligned"], m["c2"], m["c3"], rows.poles)
+    lam, bend = angular(d, m["unaligned"], m["c2"], m["c3"], of.poles)
     c, s = np.cos(angle), np.sin(angle)
     even, turn = 1 + m["cosine"] * c + m["sine"] * s, m["sine"] * c - m["cosine"] * s
-    whole = m["slope"] * t[at.each("gain")][k]
+    whole = m["slope"] * gain[k]
     return whole * over * lam * even, whole * over * (bend * even + lam * turn), whole * side * rise * lam * even
+
+
+def inductance(t: Array, rows: Rows, x: Array, angle: Array, k: Index) -> tuple[Array, Array, Array]:
+    """As `mapped`, by the terms of a fit."""
+    return mapped(dict(zip(MAP, t, strict=False)), t[Terms(len(rows.x)).each("gain")], rows, k, x, angle)
 
 
 def flux(t: Array, rows: Rows) -> Array:

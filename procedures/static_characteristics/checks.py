@@ -8,11 +8,12 @@ import numpy as np
 
 from bench.findings import Effect, Finding
 from bench.rigfile import RigFile
+from procedures.inductance_map.model import mapped
 from procedures.shared import signals
 from procedures.stages.stators import phases
 from procedures.static_characteristics import fit
 from procedures.static_characteristics.estimates import FIRST, Result
-from procedures.static_characteristics.model import MAP, Array, Rows, Terms, q_of, slopes
+from procedures.static_characteristics.model import MAP, Array, Rows, Terms, q_of
 from procedures.static_characteristics.plan import Plan
 from procedures.static_characteristics.readings import held, less_zeros, rows
 from procedures.static_characteristics.steps import Taken, cells
@@ -87,7 +88,7 @@ def of_order(t: Taken, rig: RigFile) -> Iterator[Finding]:
 def _expected(of: Rows, k: Array) -> tuple[Array, Array]:
     """Roughly what a phase presses at each load."""
     m = {**dict.fromkeys(MAP, 0.0), **FIRST}
-    _, along, around = slopes(m, np.ones(len(of.side)), of, k.astype(np.intp), of.x[of.place], of.angle[of.place])
+    _, around, along = mapped(m, np.ones(len(of.side)), of, k.astype(np.intp), of.x[of.place], of.angle[of.place])
     q = q_of(of.current, m["saturation"])
     return along * q, around * q
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
+from procedures.inductance_map.model import mapped
 from procedures.shared.joint import parts
 from procedures.stages.map_model import present
 from procedures.stages.stators import Phase, phases
@@ -17,7 +18,7 @@ from procedures.static_characteristics import fit
 from procedures.static_characteristics.beside import Beside
 from procedures.static_characteristics.fit import Found, Known
 from procedures.static_characteristics.known import certificates
-from procedures.static_characteristics.model import MAP, PHASES, Array, Rows, Terms, held_at, q_of, slopes
+from procedures.static_characteristics.model import MAP, PHASES, Array, Rows, Terms, held_at, q_of
 from procedures.static_characteristics.readings import held, rows
 from procedures.static_characteristics.steps import Taken, cells
 
@@ -110,10 +111,10 @@ def greatest_loads(t: Array, of: Rows, current: float) -> tuple[Array, Array]:
     q = float(q_of(np.array(current), m["saturation"]))
     even = {**m, "cosine": 0.0, "sine": 0.0}
     x = np.full(PHASES, m["centre"])
-    force = slopes(even, gain, of, k, x, of.aligned + zero)[1] * q
+    force = mapped(even, gain, of, k, x, of.aligned + zero)[2] * q
     turned, each = np.linspace(0, math.pi / of.poles, ANGLES), np.tile(k, ANGLES)
     at = np.repeat(-turned, PHASES) + np.tile(of.aligned + zero, ANGLES)
-    around = slopes(even, gain, of, each, np.full(len(each), m["centre"]), at)[2].reshape(ANGLES, PHASES)
+    around = mapped(even, gain, of, each, np.full(len(each), m["centre"]), at)[1].reshape(ANGLES, PHASES)
     return np.abs(force), around.max(axis=0) * q
 
 
@@ -145,7 +146,7 @@ def true_currents(t: Array, of: Rows) -> Array:
 def loads_by(m: Mapping[str, float], gain: Array, of: Rows, where: tuple[Array, Array, Array]) -> tuple[Array, Array]:
     """Force N and torque N m of each load by a map, at places x m and angle rad and with a current A."""
     x, angle, current = where
-    _, along, around = slopes(m, gain, of, of.phase, x, angle)
+    _, around, along = mapped(m, gain, of, of.phase, x, angle)
     q = q_of(current, m["saturation"])
     return along * q, around * q
 

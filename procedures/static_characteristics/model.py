@@ -18,13 +18,12 @@ by that; one that both have does not.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from procedures.inductance_map.model import advance, angular, overlapped
+from procedures.inductance_map.model import mapped
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
@@ -102,21 +101,6 @@ def q_of(current: Array, saturation: float) -> Array:
     return out
 
 
-def slopes(
-    m: Mapping[str, float], gain: Array, rows: Rows, k: Index, x: Array, angle: Array
-) -> tuple[Array, Array, Array]:
-    """G H of phases `k` at `x` m and `angle` rad, with its slopes along H/m and around H/rad."""
-    side = rows.side[k]
-    d = angle - rows.aligned[k] - np.where(rows.stator[k] == 0, m["zero_1"], m["zero_2"])
-    o = m["overlap"] + side * (x - m["centre"])
-    over, rise = overlapped(o, m["length"], m["fringe"]), advance(o, m["length"], m["fringe"])
-    lam, bend = angular(d, m["unaligned"], m["c2"], m["c3"], rows.poles)
-    c, s = np.cos(angle), np.sin(angle)
-    even, turn = 1 + m["cosine"] * c + m["sine"] * s, m["sine"] * c - m["cosine"] * s
-    whole = m["slope"] * gain[k]
-    return whole * over * lam * even, whole * side * rise * lam * even, whole * over * (bend * even + lam * turn)
-
-
 def held_at(t: Array, rows: Rows) -> tuple[Array, Array]:
     """True x m and angle rad of each load (n,): those of its place, and as far on as cells yield."""
     at, p = Terms(len(rows.x)), rows.place
@@ -130,7 +114,7 @@ def acting(t: Array, rows: Rows) -> tuple[Array, Array]:
     at, k = Terms(len(rows.x)), rows.phase
     m = dict(zip(MAP, t, strict=False))
     x, angle = held_at(t, rows)
-    _, along, around = slopes(m, t[at.each("gain")], rows, k, x, angle)
+    _, around, along = mapped(m, t[at.each("gain")], rows, k, x, angle)
     q = q_of((rows.current - t[at.each("offset")][k]) / t[at.each("current")][k], m["saturation"])
     return along * q, around * q
 
