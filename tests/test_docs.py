@@ -131,7 +131,7 @@ def case(page: Path) -> Any:
     return pytest.param(page, id=page.stem, marks=[pytest.mark.long] if page.stem in LONG else [])
 
 
-@pytest.mark.timeout(180)
+@pytest.mark.timeout(600)
 @pytest.mark.parametrize("page", [case(page) for page in PAGES])
 def test_commands_work(page: Path, tmp_path: Path, chains: Chains) -> None:
     chain, lines = commands(page)
