@@ -12,6 +12,7 @@ from bench.recording.earlier import AGAIN
 
 PLAN = ("angles=1", "rounds=8", "settle_s=0.15", "average_s=0.1")
 KILLED_AT = 60
+NEARLY_DONE = f"step {KILLED_AT + 1}/72"
 
 
 @pytest.mark.long
@@ -21,8 +22,9 @@ def test_a_killed_calibration_goes_on_over_the_link(tmp_path: Path) -> None:
     with processes.served(tmp_path, "--seed", "1") as rig:
         run = ("run", "amb-calibration", "--rig", "tsbs12", "--backend", "live", "--operator", "auto", "--no-report")
         with processes.real_bench(tmp_path, *run, *rig.links("slcan:socket"), *plan) as child:
-            child.wait_for(f"step {KILLED_AT + 1}/72", timeout_s=500.0)
+            child.wait_for(NEARLY_DONE, timeout_s=500.0)
             child.kill()
+        rig.child.wait_for("LANDING -> FAULT")  # until its rotor rests, the controller obeys the host that is gone
         (first,) = (tmp_path / "runs").glob("amb-calibration-*")
         before = Recording.open(first / "recording.mcap")
         assert before.truncated
