@@ -15,7 +15,7 @@ demo: setup
 	$(BIN)/bench run amb-calibration --rig tsbs12 --seed 1
 
 test: setup
-	$(BIN)/python -m pytest -q -m "not long and not faults and not links and not browser" -n 3 --dist loadgroup
+	$(BIN)/python -m pytest -q -m "not long and not faults and not links and not browser" -n 3 --dist loadgroup --durations=20 --durations-min=8
 
 check: setup
 	$(BIN)/ruff format --check .
@@ -25,7 +25,7 @@ check: setup
 	$(MAKE) test
 
 ci-long: setup
-	$(BIN)/python -m pytest -q -m "long and not links" -n 2 --dist loadgroup tests
+	$(BIN)/python -m pytest -q -m "long and not links" -n 2 --dist loadgroup --durations=40 --durations-min=20 tests
 
 faults: setup
 	$(BIN)/python -m pytest -q -m faults tests/firmware/test_misbehaviours.py
