@@ -117,15 +117,15 @@ def _resolved(address: str, port: int, options: str) -> tuple[socket.AddressFami
     try:
         found = socket.getaddrinfo(address, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0]
     except (OSError, UnicodeError) as error:
-        raise ConfigError(f"{options}bind {address}: found no such address ({error}); expected one of this host, such as "
-                          "127.0.0.1 or 0.0.0.0") from error  # fmt: skip
+        raise ConfigError(f"{options}bind {address}: found no such address; expected one of this host, such as 127.0.0.1 or "
+                          "0.0.0.0; nothing was started") from error  # fmt: skip
     return found[0], found[4]
 
 
 def _why(error: OSError, address: str, port: int, options: str) -> str:
     if error.errno == errno.EADDRINUSE:
         return (f"{options}port {port}: found it in use on {address}; expected a free port; nothing was started. Next: end "
-                "what uses it, give another, or leave {options}port out for any free one")  # fmt: skip
+                f"what uses it, give another, or leave {options}port out for any free one")  # fmt: skip
     if error.errno == errno.EADDRNOTAVAIL:
         return (f"{options}bind {address}: found no such address on this host; expected one of its own, such as 127.0.0.1 or "
                 "0.0.0.0; nothing was started")  # fmt: skip
