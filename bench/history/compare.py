@@ -222,12 +222,13 @@ def _stated(
 ) -> Difference:
     d = other - one
     found = interval(d)
-    drawn = (a.standard_uncertainty, b.standard_uncertainty, found.u)
-    u_a, u_b, u_d = (one.u, other.u, d.u) if source == "record" else (u or 0.0 for u in drawn)
+    drawn = [u for u in (a.standard_uncertainty, b.standard_uncertainty, found.u) if u is not None]
+    # Few degrees of freedom leave no u of draws to compare: those of the linear models say what is shared.
+    u_a, u_b, u_d = (one.u, other.u, d.u) if source == "record" or len(drawn) < 3 else drawn
     whole = u_a**2 + u_b**2
     towards = d.value - found.low if d.value > 0 else found.high - d.value
     # What is left of equal numbers by rounding is no uncertainty.
-    nothing = u_d <= 1e-12 * math.sqrt(whole)
+    nothing = found.U <= 1e-12 * math.hypot(a.expanded_uncertainty or 0.0, b.expanded_uncertainty or 0.0)
     en = (0.0 if d.value == 0 else None) if nothing or towards <= 0 else d.value / towards
     return Difference(
         name=a.name, where=a.where, unit=a.unit, a=a, b=b, value=d.value, u=found.u, U=found.U, low=found.low, high=found.high,

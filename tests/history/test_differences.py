@@ -240,6 +240,26 @@ def test_a_value_that_is_not_linear_is_taken_from_the_recording() -> None:
     )
 
 
+def test_a_difference_without_a_standard_uncertainty_is_judged_by_its_interval() -> None:
+    """Two degrees of freedom leave an interval and no u; what has an interval is not free of uncertainty."""
+    own = Influence("hysteresis/i", "hysteresis", 1.0, "N/A", "B", "rectangular")
+    one = value(70.0, {own: 1.0, scatter(0.3, 2): 1.0})
+    for middle, beyond in ((70.5, False), (75.0, True)):
+        other = value(middle, {scatter(0.2, 2): 1.0})
+        anew = {Path("a"): {("K_i", ""): one}, Path("b"): {("K_i", ""): other}}
+        sides = Side(Path("a"), record(A, one)), Side(Path("b"), record(B, other))
+        found = compare(*sides, anew=anew.__getitem__).differences[0]
+        assert (found.source, found.u) == ("recording", None)
+        assert found.en == pytest.approx(found.value / (found.value - found.low), rel=1e-12)
+        assert found.beyond is beyond
+        assert found.removed == pytest.approx(0.0, abs=1e-12)  # they share nothing
+        # By draws of numpy: a rectangle of half width sqrt(3), and t of two degrees of freedom.
+        drawn = np.random.default_rng(2)
+        rectangle, t = drawn.uniform(-math.sqrt(3), math.sqrt(3), 400_000), drawn.standard_t(2, (2, 400_000))
+        low, high = np.quantile(rectangle + 0.3 * t[0] + 0.2 * t[1], [0.025, 0.975])
+        assert pytest.approx((high - low) / 2, rel=0.02) == found.U
+
+
 def test_the_parts_say_what_could_make_the_difference() -> None:
     found = difference(record(A, value(70.0, {GAIN: 70.0, scatter(0.1): 1.0})), record(B, value(70.7, {GAIN: 70.0})))
     own, same = found.parts
