@@ -64,7 +64,7 @@ def _change(s: Segment, step: Step | None, position: int, t: Told) -> str:
     by = (
         ""
         if step is None
-        else f"; mean {_signed(step.change, t, 1)} ± {t.with_unit(step.half, 1)} against the one before"
+        else f"; mean {_signed(step.change, t, 1)} ± {t.with_unit(step.half, 1)} against segment {(s.against or 0) + 1}"
     )
     return f"segment {position + 1}{changed}{by}"
 

@@ -94,3 +94,12 @@ class Result(NamedTuple):
         }
         found = [name for name, (now, then) in both.items() if now and then and now != then]
         return (*found, *(("calibrations",) if self.calibrations != before.calibrations else ()))
+
+    def filled(self, before: Result) -> Result:
+        """With what it does not say of how it was made as `before` has it."""
+        silent = {
+            name: getattr(before, name)
+            for name in ("parameters", "firmware", "certificates")
+            if not getattr(self, name)
+        }
+        return self._replace(**silent) if silent else self
