@@ -54,7 +54,7 @@ def _head(trend: Trend, t: Told, older: bool) -> tuple[str, str]:
     left = [
         "older ones are not shown (--last)" if older else "",
         f"{trend.history.broken} without a value left out" if trend.history.broken else "",
-        f"{trend.history.repeated} repeated simulations left out" if trend.history.repeated else "",
+        f"{trend.history.repeated} that are there twice left out" if trend.history.repeated else "",
     ]
     return of, "; ".join(x for x in (span, *left) if x)
 

@@ -228,7 +228,8 @@ def _stated(
     whole = u_a**2 + u_b**2
     towards = d.value - found.low if d.value > 0 else found.high - d.value
     # What is left of equal numbers by rounding is no uncertainty.
-    nothing = found.U <= 1e-12 * math.hypot(a.expanded_uncertainty or 0.0, b.expanded_uncertainty or 0.0)
+    both = math.hypot(a.expanded_uncertainty or 0.0, b.expanded_uncertainty or 0.0)
+    nothing = both * 1e-12 >= found.U
     en = (0.0 if d.value == 0 else None) if nothing or towards <= 0 else d.value / towards
     return Difference(
         name=a.name, where=a.where, unit=a.unit, a=a, b=b, value=d.value, u=found.u, U=found.U, low=found.low, high=found.high,

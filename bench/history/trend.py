@@ -57,8 +57,8 @@ class Signal:
 
 @dataclass(frozen=True)
 class Segment:
-    """Runs between two changes. `changed` says what differs from the segment before of the same plan, or that the plan does from
-    the one that began last; `against` is the number of that segment, None for the first."""
+    """Runs between two changes. `changed` says what differs from the segment before of the same plan, or that the plan does
+    from the one that began last; `against` is the number of that segment, None for the first."""
 
     results: tuple[Result, ...]
     times: Array

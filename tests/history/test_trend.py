@@ -160,6 +160,15 @@ def test_visits_are_the_days_of_a_virtual_machine() -> None:
     assert again.history.times == found.history.times
 
 
+def test_a_copy_of_a_run_is_no_second_measurement() -> None:
+    """Each run stands there twice: equal neighbours would take half of the moving range away."""
+    once = results(scattered(12))
+    twice = of([r._replace(run_id=name) for r in once for name in (r.run_id, f"{r.run_id}-copy")])
+    assert twice.history.repeated == 12
+    assert twice.segments[0].chart.limits == of(once).segments[0].chart.limits  # type: ignore[union-attr]
+    assert "12 that are there twice left out" in text(twice, False)
+
+
 def test_runs_without_a_value_are_left_out_and_counted() -> None:
     found = of([*results(scattered(9)), result(9, None), result(10, 75.0, outcome="ABORTED")])
     assert found.history.broken == 2
