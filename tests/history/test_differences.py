@@ -40,7 +40,7 @@ def value(middle: float, parts: Mapping[Influence, float]) -> Estimate:
 def record(run_id: str, estimate: Estimate, **other: Any) -> Record:
     """A finished run that measured K_i; every influence of a sensor, a mass or the site stands in its rig file."""
     certified = {i.id: Certified(1.0, i.u, i.unit, i.distribution, "SIM-1") for i in estimate.sensitivities
-                 if i.id.partition("/")[0] in ("sensors", "masses", "site")}  # fmt: skip
+                 if i.id.partition("/")[0] in ("sensors", "masses", "site", "capabilities")}  # fmt: skip
     start = unfinished(
         run_id=run_id, procedure="amb-calibration", rig="stand", uut={"model": "stand", "serial": "001"}, started="2026-01-01",
         seed=None, plan={}, versions={}, setup=Setup("ab" * 32, "", {}, {"K_i": "K@inboard"}, certified),
@@ -150,6 +150,16 @@ def test_a_number_of_the_day_is_another_one_on_each() -> None:
     weight = Influence("site/gravity", "gravity", 0.03, "m/s^2", "B", "normal")
     one = value(1.0, {air: 1.0, weight: 1.0})
     assert difference(record(A, one), record(B, one)).u == pytest.approx(0.03 * math.sqrt(2), rel=1e-3)
+
+
+def test_a_zero_that_wanders_does_so_another_way_in_each() -> None:
+    """What stands in the rig file is how fast it may; a load cell's gain beside it is one and the same."""
+    drift = Influence("capabilities/reference/x/drift", "drift", 0.03, "m/s", "B", "normal")
+    gain = Influence("capabilities/load_cells/x/gain", "gain of the cell", 0.5, "1", "B", "normal")
+    one = value(1.0, {drift: 1.0, gain: 1.0})
+    found = difference(record(A, one), record(B, one))
+    assert found.u == pytest.approx(0.03 * math.sqrt(2), rel=1e-9)
+    assert found.least == found.U
 
 
 def test_a_number_that_was_certified_anew_is_another_one() -> None:
