@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Literal
 
 from bench.errors import BenchError, ConfigError
+from bench.history.cautions import cautions
 from bench.history.shared import Identities, as_one, identities, linear, renamed
 from bench.record.records import Measurement, Record
 from bench.rigfile.aliases import in_full
@@ -98,13 +99,15 @@ class Difference:
 
 @dataclass(frozen=True)
 class Comparison:
-    """`only` are quantities that one of the two alone has measured."""
+    """`only` are quantities that one of the two alone has measured; `cautions` what keeps the differences from saying what they
+    seem to say, a sentence each."""
 
     a: Side
     b: Side
     one_machine: bool
     differences: tuple[Difference, ...]
     only: tuple[str, ...]
+    cautions: tuple[str, ...]
 
 
 def compare(a: Side, b: Side, anew: Anew | None = None) -> Comparison:
@@ -127,7 +130,7 @@ def compare(a: Side, b: Side, anew: Anew | None = None) -> Comparison:
     again = _anew(a, b, of, anew) if any(bent(ours[k]) or bent(theirs[k]) for k in both) else {}
     found = tuple(_difference(ours[k], theirs[k], a.record.run_id, b.record.run_id, of, again) for k in both)
     only = tuple(k for k in (*ours, *theirs) if k not in both)
-    return Comparison(a, b, of.one_machine, found, tuple(dict.fromkeys(only)))
+    return Comparison(a, b, of.one_machine, found, tuple(dict.fromkeys(only)), tuple(cautions(a.record, b.record)))
 
 
 def _refuse(a: Side, b: Side) -> None:

@@ -14,13 +14,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bench.calibration import Used
 from bench.errors import AnalysisError, ConfigError
-from bench.findings import SIMULATED_CONTROLLER, Finding
+from bench.findings import SIMULATED_CONTROLLER, Effect, Finding
 from bench.history.compare import Comparison, Difference, Side, bent, compare
 from bench.history.differ import Differs, differing
 from bench.quantity import Quantity
 from bench.record.outcomes import Outcome
-from bench.record.records import Record, findings_of, measurement, unfinished
+from bench.record.records import ContinuedRun, Record, findings_of, measurement, unfinished
 from bench.record.setup import Certified, Setup
 from bench.uncertainty import Estimate, Influence
 
@@ -305,6 +306,32 @@ def test_what_cannot_be_compared_is_refused() -> None:
     ):
         with pytest.raises(ConfigError, match=said):
             compared(a, dataclasses.replace(b, **change))
+
+
+def test_what_the_budgets_do_not_say_is_a_caution() -> None:
+    a, b = (record(run, value(1.0, {GAIN: 1.0})) for run in (A, B))
+    assert compared(a, b).cautions == ()
+    gone_on = ContinuedRun(A, "recording.mcap", "ab" * 32, 9, "2026-01-01", "killed")
+    used = Used("unbalance", "unbalance-1", "2025-01-01", "2025-06-01", "ab" * 32, "expired")
+    overdue = Finding("certificate-overdue", "it was due", "certificates.force")
+    doubt = Finding("drift-between-halves", "it moved", "", Effect.INDETERMINATE)
+    other_unit = (dataclasses.replace(b.measurements[0], unit="N/mA"), *b.measurements)
+    for change, said in (
+        ({"continues": (gone_on,)}, "both rest on steps of one recording"),
+        (
+            {"outcome": Outcome.INDETERMINATE, "findings": findings_of([doubt])},
+            "B ended INDETERMINATE (drift-between-halves)",
+        ),
+        ({"outcome": Outcome.ABORTED}, "B ended ABORTED: its values"),
+        ({"findings": findings_of([overdue])}, "B rests on certificates that did not hold on its day: force"),
+        ({"calibrations": (used,)}, "B rests on calibrations that had expired: unbalance"),
+        ({"measurements": other_unit}, "K_i: found N/mA in B; A has N/A"),
+    ):
+        (found,) = compared(a, dataclasses.replace(b, **change)).cautions  # type: ignore[arg-type]
+        assert said in found
+    once = {"seed": 3, "visit": 0}
+    (found,) = compared(dataclasses.replace(a, **once), dataclasses.replace(b, **once)).cautions  # type: ignore[arg-type]
+    assert "both simulate visit 0 of seed 3" in found
 
 
 def test_what_one_alone_has_measured_is_named() -> None:
