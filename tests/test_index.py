@@ -17,7 +17,7 @@ from bench.findings import SIMULATED_CONTROLLER, Finding
 from bench.quantity import Quantity
 from bench.record.limits import Limit
 from bench.record.outcomes import Outcome
-from bench.record.records import findings_of, measurement, read_record, unfinished, write_record
+from bench.record.records import findings_of, measurement, missing, read_record, unfinished, write_record
 from bench.record.setup import Certified, Setup
 from bench.run import index
 from bench.uncertainty import Estimate, Influence
@@ -106,12 +106,15 @@ def test_deleted_runs_are_not_listed(tmp_path: Path) -> None:
 def measuring(
     root: Path, second: int, value: float, *, setup: Setup | None = None, plan: int = 9, rig: str = "tsbs12"
 ) -> Path:
-    """A run that measured K_i, and B at one place beside another."""
+    """A run that measured K_i, which rests on a gain where the record says with what, and B at one place beside another."""
     path = run(root, second)
     estimate = Estimate.of(value, Influence("scatter/1", "scatter", 0.1, "N/A", "A", "normal", 20.0))
+    gain = Estimate(
+        0.0, "N/A", {} if setup is None else {Influence("sensors/i/gain", "gain", 1e-3, "1", "B", "normal"): 1.0}
+    )
     force, drag = Quantity("K_i", "N/A", "force constant"), Quantity("B", "N/A", "drag")
     made = [
-        measurement(force.measured(estimate), Limit(70.0, None, "N/A", "design", True)),
+        measurement(force.measured(estimate + gain), Limit(70.0, None, "N/A", "design", True)),
         measurement(drag.measured(estimate), None),
         measurement(drag.measured(estimate, "by the channel"), None),
     ]
@@ -171,6 +174,25 @@ def test_what_makes_another_series_is_told_apart(tmp_path: Path) -> None:
     found = index.results(tmp_path, quantity="K_i")
     changed = [now.changed(before) for before, now in itertools.pairwise(found)]
     assert changed == [(), ("parameters",), ("plan", "certificates")]  # what the oldest does not say has not changed
+    drag = index.results(tmp_path, quantity="B")
+    assert [n.changed(b) for b, n in itertools.pairwise(drag)] == [(), ("parameters",), ("plan",)]  # rests on no gain
+
+
+def test_a_run_without_one_of_its_results_has_no_other_certificates(tmp_path: Path) -> None:
+    """K_i is missing in the second run, so that nothing of it rests on the gain: B is measured as before."""
+    paths = [measuring(tmp_path, second, 71.0, setup=setup_with()) for second in (1, 2, 3)]
+    record = read_record(paths[1] / "record.json")
+    assert record.setup is not None
+    lacking = dataclasses.replace(record.setup, certified={})
+    gone = missing(Quantity("K_i", "N/A", "force constant"))
+    write_record(
+        paths[1] / "record.json",
+        dataclasses.replace(record, setup=lacking, measurements=(gone, *record.measurements[1:])),
+    )
+    index.add(paths[1])
+    for quantity in ("B", "K_i"):
+        found = index.results(tmp_path, quantity=quantity)
+        assert [now.changed(before) for before, now in itertools.pairwise(found)] == [(), ()]
 
 
 def test_damage_within_the_index_is_seen_where_it_is_read(tmp_path: Path) -> None:

@@ -13,8 +13,10 @@ from test_rigfile import DBC, TOML, changed, of_schema_1, problems, written
 from bench.cli.__main__ import main
 from bench.quantity import Quantity
 from bench.record.records import read_record
+from bench.record.setup import certified_of
 from bench.rigfile import RigFile
 from bench.rigfile.certificates import out_of_date
+from bench.rigfile.check_machine import problems_of
 from bench.run.certificates import overdue
 from bench.rundir import RunDirectory
 from bench.uncertainty import Estimate, Influence
@@ -132,3 +134,20 @@ def test_it_is_told_by_the_day_of_the_run_and_of_what_the_results_rest_on(starte
     length = Quantity("length", "m", "a length")
     assert [f.code for f in overdue(recording, [length.measured(Estimate(1.0, sensitivities={span: 1.0}))])] == codes
     assert not [*overdue(recording, [length.measured(Estimate(1.0, sensitivities={gap: 1.0}))])]
+
+
+def test_an_instrument_beside_the_machine_goes_by_a_certificate_too() -> None:
+    """A load cell's gain: it stands in the record of what results rest on, its due day is told, a wrong key refused."""
+    toml, dbc = (Path(f"rigs/rlsrm.{ending}").read_text(encoding="utf-8") for ending in ("toml", "dbc"))
+    cell = 'source = "certificate SIM-F-196, 20 N" }'
+    goes_by = cell.replace(" }", ', certificate = "force" }')
+    table = '[certificates.force]\nnumber = "SIM-F-196"\ndate = "2024-01-01"\ndue = "2025-01-01"\n\n[capabilities.load_cells.x]'
+    rig = RigFile.parse(changed(toml, (cell, goes_by), ("[capabilities.load_cells.x]", table)), dbc)
+    gain = "capabilities/load_cells/x/gain"
+    found = certified_of(rig, [gain, "scatter/loads/1"])
+    assert {i: (c.standard_uncertainty, c.certificate) for i, c in found.items()} == {
+        gain: (1e-3, "SIM-F-196, 2024-01-01")
+    }
+    assert [o.numbers for o in out_of_date(rig, date(2026, 1, 1), [gain])] == [(gain,)]
+    key, *_ = (p.key for p in problems_of(RigFile.parse(changed(toml, (cell, goes_by)), dbc)))
+    assert key == "capabilities.load_cells.x.gain.certificate"

@@ -86,6 +86,8 @@ def lines(found: Comparison, differ: Sequence[Differs], width: int, whole: bool 
     yield from _differ(differ, width, whole)
     if not found.one_machine:
         yield from _folded("  ", "two machines: they share what goes by one certificate, and nothing else", width)
+    for caution in found.cautions:
+        yield from _folded("  caution: ", caution, width)
     ordered = sorted(found.differences, key=lambda d: -_size(d))
     shown = (
         found.differences if whole else [d for d in ordered if d.beyond] + [d for d in ordered if not d.beyond][:SHOWN]
@@ -214,6 +216,7 @@ def as_data(found: Comparison, differ: Sequence[Differs]) -> dict[str, Any]:
         "schema": SCHEMA, "procedure": found.a.record.procedure, "a": _side(found.a), "b": _side(found.b),
         "one_machine": found.one_machine, "differs": [vars(d) for d in differ],
         "differences": [_difference_as_data(d) for d in found.differences], "only": list(found.only),
+        "cautions": list(found.cautions),
     }  # fmt: skip
 
 

@@ -54,7 +54,7 @@ def _head(trend: Trend, t: Told, older: bool) -> tuple[str, str]:
     left = [
         "older ones are not shown (--last)" if older else "",
         f"{trend.history.broken} without a value left out" if trend.history.broken else "",
-        f"{trend.history.repeated} repeated simulations left out" if trend.history.repeated else "",
+        f"{trend.history.repeated} that are there twice left out" if trend.history.repeated else "",
     ]
     return of, "; ".join(x for x in (span, *left) if x)
 
@@ -64,7 +64,7 @@ def _change(s: Segment, step: Step | None, position: int, t: Told) -> str:
     by = (
         ""
         if step is None
-        else f"; mean {_signed(step.change, t, 1)} ± {t.with_unit(step.half, 1)} against the one before"
+        else f"; mean {_signed(step.change, t, 1)} ± {t.with_unit(step.half, 1)} against segment {(s.against or 0) + 1}"
     )
     return f"segment {position + 1}{changed}{by}"
 

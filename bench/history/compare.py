@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Literal
 
 from bench.errors import BenchError, ConfigError
+from bench.history.cautions import cautions
 from bench.history.shared import Identities, as_one, identities, linear, renamed
 from bench.record.records import Measurement, Record
 from bench.rigfile.aliases import in_full
@@ -98,13 +99,15 @@ class Difference:
 
 @dataclass(frozen=True)
 class Comparison:
-    """`only` are quantities that one of the two alone has measured."""
+    """`only` are quantities that one of the two alone has measured; `cautions` what keeps the differences from saying what they
+    seem to say, a sentence each."""
 
     a: Side
     b: Side
     one_machine: bool
     differences: tuple[Difference, ...]
     only: tuple[str, ...]
+    cautions: tuple[str, ...]
 
 
 def compare(a: Side, b: Side, anew: Anew | None = None) -> Comparison:
@@ -127,7 +130,7 @@ def compare(a: Side, b: Side, anew: Anew | None = None) -> Comparison:
     again = _anew(a, b, of, anew) if any(bent(ours[k]) or bent(theirs[k]) for k in both) else {}
     found = tuple(_difference(ours[k], theirs[k], a.record.run_id, b.record.run_id, of, again) for k in both)
     only = tuple(k for k in (*ours, *theirs) if k not in both)
-    return Comparison(a, b, of.one_machine, found, tuple(dict.fromkeys(only)))
+    return Comparison(a, b, of.one_machine, found, tuple(dict.fromkeys(only)), tuple(cautions(a.record, b.record)))
 
 
 def _refuse(a: Side, b: Side) -> None:
@@ -222,12 +225,14 @@ def _stated(
 ) -> Difference:
     d = other - one
     found = interval(d)
-    drawn = (a.standard_uncertainty, b.standard_uncertainty, found.u)
-    u_a, u_b, u_d = (one.u, other.u, d.u) if source == "record" else (u or 0.0 for u in drawn)
+    drawn = [u for u in (a.standard_uncertainty, b.standard_uncertainty, found.u) if u is not None]
+    # Few degrees of freedom leave no u of draws to compare: those of the linear models say what is shared.
+    u_a, u_b, u_d = (one.u, other.u, d.u) if source == "record" or len(drawn) < 3 else drawn
     whole = u_a**2 + u_b**2
     towards = d.value - found.low if d.value > 0 else found.high - d.value
     # What is left of equal numbers by rounding is no uncertainty.
-    nothing = u_d <= 1e-12 * math.sqrt(whole)
+    both = math.hypot(a.expanded_uncertainty or 0.0, b.expanded_uncertainty or 0.0)
+    nothing = both * 1e-12 >= found.U
     en = (0.0 if d.value == 0 else None) if nothing or towards <= 0 else d.value / towards
     return Difference(
         name=a.name, where=a.where, unit=a.unit, a=a, b=b, value=d.value, u=found.u, U=found.U, low=found.low, high=found.high,

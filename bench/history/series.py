@@ -21,7 +21,8 @@ BROKEN = ("ERROR", "ABORTED")  # outcomes of which values are not taken
 @dataclass(frozen=True)
 class History:
     """Values of one quantity, oldest first. `times` are days since 1970 UTC, or the visits of a virtual machine, of which each
-    is another day. `broken` runs ended in an error and are left out, `repeated` ones are the same simulation once more."""
+    is another day. `broken` runs ended in an error and are left out, `repeated` ones are the same simulation or the same run
+    once more."""
 
     results: tuple[Result, ...]
     times: tuple[float, ...]
@@ -77,10 +78,11 @@ def days(started: str) -> float:
 
 
 def _each_once(results: Iterable[Result]) -> list[Result]:
-    """Without runs that are the same simulation once more: a seed and visit with equal plan and value measured nothing new."""
+    """Without runs that measured nothing new: the same simulation once more, a seed and visit with equal plan and value; a copy
+    of a run's directory, which began at the same second and has the same value. Copies would halve the moving range."""
     out: dict[Hashable, Result] = {}
     for r in results:
-        key = r.run_id if r.seed is None else (r.seed, r.visit, r.settings, r.value)
+        key = (r.started if r.seed is None else r.seed, r.visit, r.settings, r.value)
         out.setdefault(key, r)
     return list(out.values())
 

@@ -21,6 +21,9 @@ from bench.uncertainty.estimate import Array, Deviations
 
 OF_A_DAY = frozenset({"site/air_density"})
 """Numbers of the rig file that state a range for every day, within which each has its own."""
+WANDERS = (
+    "drift"  # last part of the identity of a number that states how fast a zero may wander: another way in each run
+)
 SAME = 1e-9  # of a standard uncertainty: rounding of a quotient
 
 
@@ -43,11 +46,14 @@ def identities(a: Record, b: Record) -> Identities:
     """Of two runs, by what their records say."""
     ours, theirs = _entries(a), _entries(b)
     one_machine = same_machine(a, b)
-    both = (
-        i for i in ours.keys() & theirs.keys() if i not in OF_A_DAY and _stands(a, ours[i]) and _stands(b, theirs[i])
-    )
+    both = (i for i in ours.keys() & theirs.keys() if not of_a_day(i) and _stands(a, ours[i]) and _stands(b, theirs[i]))
     standing = frozenset(i for i in both if _alike(ours[i], theirs[i]) and _one_thing(i, a, b, one_machine))
     return Identities(standing, one_machine)
+
+
+def of_a_day(influence: str) -> bool:
+    """Whether a number of the rig file is another one in every run, though it is stated once."""
+    return influence in OF_A_DAY or influence.rpartition("/")[2] == WANDERS
 
 
 def same_machine(a: Record, b: Record) -> bool:
@@ -124,7 +130,7 @@ def as_one(other: Estimate, one: Estimate, run_other: str, run_one: str) -> Esti
 
     def rename(i: Influence) -> Influence:
         run, _, name = i.id.partition("/")
-        mine = ours.get(f"{run_one}/{name}", i) if run == run_other and name not in OF_A_DAY else i
+        mine = ours.get(f"{run_one}/{name}", i) if run == run_other and not of_a_day(name) else i
         return mine if mine.distribution == i.distribution and mine.u > 0 else i
 
     return renamed(other, rename)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -58,7 +57,8 @@ class Signal:
 
 @dataclass(frozen=True)
 class Segment:
-    """Runs between two changes. `changed` says what differs from the segment before of the same plan, or that the plan does."""
+    """Runs between two changes. `changed` says what differs from the segment before of the same plan, or that the plan does
+    from the one that began last; `against` is the number of that segment, None for the first."""
 
     results: tuple[Result, ...]
     times: Array
@@ -67,6 +67,7 @@ class Segment:
     chart: Chart | None
     signals: tuple[Signal, ...]
     drift: Drift | None
+    against: int | None
 
     @property
     def expanded(self) -> Array:
@@ -139,7 +140,8 @@ class Trend:
 
 @dataclass(frozen=True)
 class Step:
-    """By how much a segment's mean differs from that of the one before, with its 95 % interval, from the scatter within all."""
+    """By how much a segment's mean differs from that of the one it is held against, with its 95 % interval, from the scatter
+    within all."""
 
     change: float
     half: float
@@ -157,32 +159,43 @@ def trend(history: History, *, weight: float = WEIGHT, baseline: int = BASELINE)
         )
     if baseline < BASELINE:
         raise ConfigError(f"--baseline: found {baseline}; expected {BASELINE} or more. Next: leave it out")
-    return Trend(history, tuple(_segment(*part, weight, baseline) for part in _parted(history)), weight)
+    return Trend(history, tuple(_segment(part, weight, baseline) for part in _parted(history)), weight)
 
 
-def _parted(history: History) -> list[tuple[list[Result], list[float], tuple[str, ...]]]:
-    """Runs and times of each segment, with what was changed at its beginning; of plans that take turns each has its own."""
-    parts: list[tuple[list[Result], list[float], tuple[str, ...]]] = []
-    of_plan: dict[str, tuple[list[Result], list[float], tuple[str, ...]]] = {}
+@dataclass
+class _Part:
+    """Runs and times of a segment that grows; `known` is the newest run with what it does not say as it was before."""
+
+    results: list[Result]
+    times: list[float]
+    known: Result
+    changed: tuple[str, ...]
+    against: int | None
+
+
+def _parted(history: History) -> list[_Part]:
+    """The runs of each segment; of plans that take turns each has its own."""
+    parts: list[_Part] = []
+    of_plan: dict[str, int] = {}
     for result, time in zip(history.results, history.times, strict=True):
-        part = of_plan.get(result.settings)
-        changed = ("plan",) if part is None else result.changed(part[0][-1])
-        if part is None or changed:
-            part = of_plan[result.settings] = ([], [], changed if parts else ())
-            parts.append(part)
-        part[0].append(result)
-        part[1].append(time)
+        before = of_plan.get(result.settings)
+        changed = ("plan",) if before is None else result.changed(parts[before].known)
+        if before is None or changed:
+            against = before if before is not None else len(parts) - 1 if parts else None
+            of_plan[result.settings] = len(parts)
+            parts.append(_Part([], [], result, changed if parts else (), against))
+        part = parts[of_plan[result.settings]]
+        part.results.append(result)
+        part.times.append(time)
+        part.known = result.filled(part.known)
     return parts
 
 
-def _segment(
-    results: list[Result], times: list[float], changed: tuple[str, ...], weight: float, baseline: int
-) -> Segment:  # fmt: skip
-    values = np.array([r.value for r in results], np.float64)
-    at = np.array(times)
+def _segment(part: _Part, weight: float, baseline: int) -> Segment:
+    values, at = np.array([r.value for r in part.results], np.float64), np.array(part.times)
     chart = _chart(values, weight, baseline) if values.size >= baseline else None
     signals = () if chart is None else _signals(values, chart)
-    return Segment(tuple(results), at, values, changed, chart, signals, fitted(at, values))
+    return Segment(tuple(part.results), at, values, part.changed, chart, signals, fitted(at, values), part.against)
 
 
 def _chart(values: Array, weight: float, baseline: int) -> Chart:
@@ -232,13 +245,15 @@ def reaches(segment: Segment) -> list[Reach]:
 
 
 def steps(trend: Trend) -> list[Step | None]:
-    """From each segment to the next; None where one of the two drifts, so that it has no level of its own, and where too few
-    runs are in all to know the scatter within (one-way analysis)."""
+    """To each segment after the first from the one that it is held against; None where one of the two drifts, so that it has no
+    level of its own, and where too few runs are in all to know the scatter within (one-way analysis)."""
     groups = [s.values for s in trend.segments]
     if len(groups) < 2 or sum(g.size for g in groups) <= len(groups):
         return [None] * (len(groups) - 1)
     found = one_way(groups)
     k = t_factor(found.dof_within) * found.residual
     drifts = [s.drift is not None and s.drift.shown for s in trend.segments]
-    return [None if c or d else Step(float(np.mean(b) - np.mean(a)), k * (1 / a.size + 1 / b.size) ** 0.5)
-            for (a, b), (c, d) in zip(pairwise(groups), pairwise(drifts), strict=True)]  # fmt: skip
+    pairs = [(s.against or 0, b) for b, s in enumerate(trend.segments)][1:]
+    return [None if drifts[a] or drifts[b] else Step(float(np.mean(groups[b]) - np.mean(groups[a])),
+                                                     k * (1 / groups[a].size + 1 / groups[b].size) ** 0.5)
+            for a, b in pairs]  # fmt: skip

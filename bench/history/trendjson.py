@@ -36,6 +36,7 @@ def _segment(s: Segment, trend: Trend, step: Step | None) -> dict[str, Any]:
 
     return {
         "changed": list(s.changed),
+        "against": None if s.against is None else s.against + 1,
         "step": None if step is None else {"change": step.change, "half_width": step.half},
         "runs": _runs(s),
         "chart": _chart(s),

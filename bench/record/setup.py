@@ -10,7 +10,7 @@ from typing import ClassVar
 from pydantic import ConfigDict
 
 from bench.rigfile import RigFile
-from bench.rigfile.places import Places
+from bench.rigfile.certificates import certified_numbers
 from bench.rigfile.toleranced import Toleranced
 from bench.schema import STRICT
 
@@ -57,7 +57,7 @@ def firmware_of(rig: RigFile) -> str:
 
 def certified_of(rig: RigFile, identities: Iterable[str]) -> dict[str, Certified]:
     """What the rig file says of those of the influences that stand in it."""
-    known = {**Places(rig).known, "masses/density": rig.mass_density, "masses/hanger": rig.hanger}
+    known = {**certified_numbers(rig), "masses/density": rig.mass_density, "masses/hanger": rig.hanger}
     return {i: _certified(rig, known[i]) for i in sorted(set(identities)) if i in known}
 
 

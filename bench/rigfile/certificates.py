@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import date
 
 from bench.rigfile.elements import Certificate
 from bench.rigfile.model import RigFile
+from bench.rigfile.numbers import numbers_in
 from bench.rigfile.places import Places
+from bench.rigfile.toleranced import Toleranced
 
 
 @dataclass(frozen=True)
@@ -27,11 +29,17 @@ class OutOfDate:
         return f"{which} is dated {c.date}, which is in the future" if self.ahead else f"{which} was due on {c.due}"
 
 
+def certified_numbers(rig: RigFile) -> Mapping[str, Toleranced]:
+    """Every number that may go by a certificate, by its identity: those of the machine, and of the instruments beside it (load
+    cells, a reference, what holds it)."""
+    return {**Places(rig).known, **dict(numbers_in(rig.capabilities, ("capabilities",)))}
+
+
 def out_of_date(rig: RigFile, day: date, numbers: Collection[str] | None = None) -> Iterator[OutOfDate]:
     """Certificates that do not hold on a day, of the `numbers` with these identities alone, or of all: that have no due date
     hold for ever."""
     by_certificate: dict[str, list[str]] = {}
-    for identity, number in Places(rig).known.items():
+    for identity, number in certified_numbers(rig).items():
         if number.certificate in rig.certificates and (numbers is None or identity in numbers):
             by_certificate.setdefault(number.certificate, []).append(identity)
     for name, identities in by_certificate.items():

@@ -13,6 +13,7 @@ from typing import Any
 
 from bench import units
 from bench.errors import Problem
+from bench.rigfile.certificates import certified_numbers
 from bench.rigfile.check_stages import encoders_of
 from bench.rigfile.elements import From, Of
 from bench.rigfile.model import RigFile
@@ -174,7 +175,7 @@ def _motors(rig: RigFile) -> Iterator[Found]:
 
 
 def _certificates(rig: RigFile) -> Iterator[Found]:
-    for identity, number in Places(rig).known.items():
+    for identity, number in certified_numbers(rig).items():
         if number.certificate and number.certificate not in rig.certificates:
             known = ", ".join(rig.certificates) or "(none)"
             yield f"{identity.replace('/', '.')}.certificate", number.certificate, f"one of [certificates]: {known}"

@@ -20,7 +20,7 @@ from bench.run.indexrow import IndexEntry, MadeWith, Result, Row
 from bench.rundir import RunDirectory, runs_in
 
 NAME = "index.sqlite"
-VERSION = 4  # of the tables; another one is rebuilt
+VERSION = 5  # of the tables; another one is rebuilt
 SOUND = ("PASS", "DONE")
 T = TypeVar("T")
 log = logging.getLogger(__name__)
@@ -35,7 +35,7 @@ TABLES = f"""
     CREATE INDEX runs_by_time ON runs (started, run_id);
     CREATE TABLE names (number INTEGER PRIMARY KEY, {CALLED}, UNIQUE ({CALLED}));
     CREATE TABLE results (number INTEGER, run INTEGER, ordinal INTEGER, value, u, expanded, dof, p, lower, upper, verdict,
-                          PRIMARY KEY (number, run, ordinal)) WITHOUT ROWID;
+                          certificates, PRIMARY KEY (number, run, ordinal)) WITHOUT ROWID;
     CREATE INDEX results_by_run ON results (run);
 """
 """Results lie together by name, and refer to runs by number: so a series of very many is read in a fraction of a second."""
@@ -205,7 +205,7 @@ def _put(db: sqlite3.Connection, row: Row) -> None:
     run = db.execute(f"INSERT INTO runs VALUES ({', '.join('?' * len(of_run))})", of_run).lastrowid
     for ordinal, (called, numbers) in enumerate(row.results):
         number = _kept(db, "names", "number", CALLED, called)
-        db.execute("INSERT INTO results VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", (number, run, ordinal, *numbers))
+        db.execute("INSERT INTO results VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", (number, run, ordinal, *numbers))
 
 
 def _kept(db: sqlite3.Connection, table: str, key: str, columns: str, texts: tuple[str, ...]) -> int:

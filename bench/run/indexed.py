@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
 
 from bench.findings import SIMULATED_CONTROLLER
 from bench.record.records import Measurement, Record, read_record
+from bench.record.setup import Setup
 from bench.rigfile.aliases import in_full
 from bench.run.indexrow import IndexEntry, MadeWith, Row
 from bench.rundir import RunDirectory
@@ -33,9 +33,9 @@ def row(run: RunDirectory) -> Row:
     made_with = MadeWith(
         settings=digest({k: v for k, v in record.plan.items() if v is not None}),
         parameters="" if setup is None else digest(setup.parameters), firmware="" if setup is None else setup.firmware,
-        certificates=_certificates(record), calibrations=digest([(c.procedure, c.run_id) for c in record.calibrations]),
+        calibrations=digest([(c.procedure, c.run_id) for c in record.calibrations]),
     )  # fmt: skip
-    return Row(entry, made_with, [_result(m, {} if setup is None else setup.aliases) for m in record.measurements])
+    return Row(entry, made_with, [_result(m, setup) for m in record.measurements])
 
 
 def digest(content: object) -> str:
@@ -44,23 +44,24 @@ def digest(content: object) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:DIGITS]
 
 
-def _certificates(record: Record) -> str:
-    """Of the numbers and not of the words: another wording makes no other certificate."""
-    if record.setup is None or not record.measurements:
-        return ""
-    stated = record.setup.certified
-    return digest({i: (c.value, c.standard_uncertainty, c.distribution) for i, c in stated.items()})
-
-
-def _result(m: Measurement, aliases: Mapping[str, str]) -> tuple[tuple[str, ...], tuple[float | str | None, ...]]:
+def _result(m: Measurement, setup: Setup | None) -> tuple[tuple[str, ...], tuple[float | str | None, ...]]:
     name = f"{m.name}@{m.where}" if m.where else m.name
-    full = in_full(aliases, name)
+    full = in_full({} if setup is None else setup.aliases, name)
     kind, _, place = full.partition("@")
     lower, upper = (None, None) if m.limit is None else (m.limit.low, m.limit.high)
     return (name, full, kind, place, m.unit), (
         m.value, m.standard_uncertainty, m.expanded_uncertainty, m.dof, m.coverage_probability or PROBABILITY, lower, upper,
-        m.verdict.value,
+        m.verdict.value, _certificates(m, setup),
     )  # fmt: skip
+
+
+def _certificates(m: Measurement, setup: Setup | None) -> str:
+    """Of the numbers and not of the words: another wording makes no other certificate. Of this result alone: what another one
+    of the run rests on, or lacks where that one is missing, is no change of its own."""
+    if setup is None:
+        return ""
+    stated = {e.influence: setup.certified[e.influence] for e in m.budget if e.influence in setup.certified}
+    return digest({i: (c.value, c.standard_uncertainty, c.distribution) for i, c in stated.items()}) if m.budget else ""
 
 
 def _uut(record: Record) -> str:

@@ -27,13 +27,12 @@ class MadeWith(NamedTuple):
     settings: str
     parameters: str
     firmware: str
-    certificates: str
     calibrations: str
 
 
 class Row(NamedTuple):
     """A run as its record goes into the tables. Of each result what it is called (name, that by kind and place, kind, place,
-    unit) and its numbers (value, u, U, dof, coverage probability, limits, verdict)."""
+    unit) and its numbers (value, u, U, dof, coverage probability, limits, verdict, digest of its certificates)."""
 
     entry: IndexEntry
     made_with: MadeWith
@@ -46,7 +45,7 @@ class Result(NamedTuple):
 
     Value, u, U and the limits are in `unit`; None is missing, an infinite dof, or an open limit. `settings` is a digest of the
     plan, `parameters` of those of the controller (bias currents, gains), `certificates` of what the rig file says of the
-    numbers that the run's results rest on, `calibrations` of the runs adopted that it used; `firmware` is a text.
+    numbers that this result rests on, `calibrations` of the runs adopted that it used; `firmware` is a text.
     Each is "" where the record does not say it.
     """
 
@@ -94,3 +93,12 @@ class Result(NamedTuple):
         }
         found = [name for name, (now, then) in both.items() if now and then and now != then]
         return (*found, *(("calibrations",) if self.calibrations != before.calibrations else ()))
+
+    def filled(self, before: Result) -> Result:
+        """With what it does not say of how it was made as `before` has it."""
+        silent = {
+            name: getattr(before, name)
+            for name in ("parameters", "firmware", "certificates")
+            if not getattr(self, name)
+        }
+        return self._replace(**silent) if silent else self

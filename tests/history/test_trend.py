@@ -124,9 +124,30 @@ def test_a_step_between_segments_has_its_interval() -> None:
     assert step.change == pytest.approx(0.5)
     # by hand: all 20 are 0.05 off their mean, t_0.975(18) = 2.1009
     assert step.half == pytest.approx(2.1009 * math.sqrt(20 * 0.05**2 / 18) * math.sqrt(2 / 10), rel=1e-4)
-    assert "mean +0.500 ± 0.050 N/A against the one before" in " ".join(text(found, False).split())
+    assert "mean +0.500 ± 0.050 N/A against segment 1" in " ".join(text(found, False).split())
     drifting = [*scattered(10, slope=1.0), *scattered(10)]
     assert steps(of([result(k, v, settings="ab"[k // 10]) for k, v in enumerate(drifting)])) == [None]
+
+
+def test_a_change_under_two_plans_is_held_against_the_segment_of_its_own() -> None:
+    """Plans a and b take turns, b gives 1 more; at run 17 the firmware changes and moves nothing."""
+    values = [75 + 0.05 * (-1) ** (k // 2) + (k % 2) for k in range(24)]
+    found = of([result(k, v, settings="ab"[k % 2], firmware="12"[k >= 16]) for k, v in enumerate(values)])
+    assert [s.changed for s in found.segments] == [(), ("plan",), ("firmware",), ("firmware",)]
+    assert [s.against for s in found.segments] == [None, 0, 0, 1]
+    assert [s.change for s in steps(found) if s] == pytest.approx([1.0, 0.0, 0.0])
+    assert "segment 4: new firmware; mean +0.000" in text(found, False)
+    assert "against segment 2" in text(found, False)
+    assert [s["against"] for s in as_data(found)["segments"]] == [None, 1, 1, 2]
+
+
+def test_a_run_that_does_not_say_its_firmware_hides_no_change() -> None:
+    values = scattered(20)
+    for field in ("firmware", "parameters", "certificates"):
+        said = ["1"] * 9 + [""] + ["2"] * 10
+        found = of([result(k, v, **{field: said[k]}) for k, v in enumerate(values)])
+        assert [len(s.results) for s in found.segments] == [10, 10]
+        assert found.segments[1].changed == (field,)
 
 
 def test_visits_are_the_days_of_a_virtual_machine() -> None:
@@ -137,6 +158,15 @@ def test_visits_are_the_days_of_a_virtual_machine() -> None:
     again = of([*made, made[0]._replace(run_id="r-again")])  # the same simulation measured nothing new
     assert again.history.repeated == 1
     assert again.history.times == found.history.times
+
+
+def test_a_copy_of_a_run_is_no_second_measurement() -> None:
+    """Each run stands there twice: equal neighbours would take half of the moving range away."""
+    once = results(scattered(12))
+    twice = of([r._replace(run_id=name) for r in once for name in (r.run_id, f"{r.run_id}-copy")])
+    assert twice.history.repeated == 12
+    assert twice.segments[0].chart.limits == of(once).segments[0].chart.limits  # type: ignore[union-attr]
+    assert "12 that are there twice left out" in text(twice, False)
 
 
 def test_runs_without_a_value_are_left_out_and_counted() -> None:
