@@ -13,6 +13,9 @@ from bench.errors import ConfigError
 STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 """Of what we write ourselves: no unknown key, no number for a text."""
 
+NAME = r"^[A-Za-z][\w-]*$"
+"""What parts of a machine and the like may be called in a rig file."""
+
 
 def require_schema(text: str, name: str, kind: str, schema: int, oldest: int | None = None) -> None:
     """See that `text` is JSON without NaN and of this schema, or from the `oldest` that is read on; `name` and `kind` (such as
@@ -52,6 +55,8 @@ def expected_of(error: Mapping[str, Any]) -> str:
             return "a list, as in [1, 2]"
         case "string_too_short":
             return f"at least {_counted(count['min_length'], 'character', 'characters')}"
+        case "string_pattern_mismatch" if count["pattern"] == NAME:
+            return "a name: a letter from A to Z, then letters, digits, _ or -"
     return str(error["msg"]).removeprefix("Input should be ").removeprefix("Value error, ").removeprefix("expected ")
 
 

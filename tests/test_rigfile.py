@@ -200,6 +200,8 @@ def test_a_rig_file_is_frozen() -> None:
         ("lever_left = { value = 230", "lever_left = { value = -230", "geometry.lever_left.value", "a positive number"),
         ("lever_left =", "lever_lift =", "geometry.lever_lift", "did you mean lever_left?"),
         ("[machine]", "[calibration]\ninterval = 3\n[machine]", "calibration.interval", "no such key"),
+        ("[hooks]\n", '[hooks]\n"à gauche" = { at = "geometry/hook_to_outboard" }\n', "hooks.à gauche",
+         "a name: a letter from A to Z"),
     ],
 )  # fmt: skip
 def test_one_mistake_is_named_with_its_key(tmp_path: Path, old: str, new: str, key: str, expected: str) -> None:

@@ -88,6 +88,17 @@ def test_states_and_commands_are_those_of_a_stage() -> None:
     assert any("commands.LET_GO" in str(p) for p in problems_of(rig))
 
 
+def test_a_stage_of_strokes_alone_has_no_speed_of_rotation_to_watch() -> None:
+    """One axis along, in a motor that gives force alone; around, or with a motor that gives torque, the speed is asked for."""
+    angle = TOML[TOML.index("[encoders.angle]") : TOML.index("# Weights pull along")]
+    speed = next(line for line in TOML.splitlines() if line.startswith("speed = { signal"))
+    forces = ('gives = ["torque", "axial force"]', 'gives = ["axial force"]')
+    told = "mark.speed: found nothing; expected the channel that tells the speed: the bench watches it while the machine moves"
+    assert told not in said((angle, ""), (speed, ""), forces, forces)
+    assert told in said((angle, ""), (speed, ""))
+    assert told in said((speed, ""), forces, forces)
+
+
 def test_its_stroke_is_protected_while_it_is_held() -> None:
     limits = {p.name: p for p in of_channels(load_rig("rlsrm"))}
     assert (limits["x"].low, limits["x"].high, limits["x"].held) == (-14.5e-3, 14.5e-3, True)

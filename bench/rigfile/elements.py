@@ -15,9 +15,10 @@ from pydantic import Discriminator, Field, Tag
 from bench.rigfile.numbers import Reference
 from bench.rigfile.part import Part
 from bench.rigfile.toleranced import Toleranced
+from bench.schema import NAME
 
 ORIGIN = "origin"
-Name = Annotated[str, Field(pattern=r"^[A-Za-z][\w-]*$")]
+Name = Annotated[str, Field(pattern=NAME)]
 
 
 class From(Part):

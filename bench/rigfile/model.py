@@ -255,7 +255,7 @@ def _parsed(toml_text: str, dbc_text: str, path: str) -> RigFile:
 
 
 def _problem(error: Any, path: str) -> Problem:
-    key = ".".join(str(part) for part in error["loc"] if part not in ("schema_", *FORMS)) or "(file)"
+    key = ".".join(str(part) for part in error["loc"] if part not in ("schema_", "[key]", *FORMS)) or "(file)"
     if error["type"] == UNKNOWN_UNIT:
         symbol = error["ctx"]["symbol"]
         return Problem(path, f"{key}.unit", repr(symbol), units.expected(symbol))

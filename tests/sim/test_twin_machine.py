@@ -206,6 +206,20 @@ def test_masses_hang_down_or_pull_over_a_pulley() -> None:
     assert hung("hang -")[1] == pytest.approx(-newtons / 6)
 
 
+def test_masses_whose_names_have_spaces() -> None:
+    """As a laboratory calls its weights; the shorter name is not taken for the longer one."""
+    other = '[masses]\n"0.5 kg" = ' + number(0.5, "kg") + '\n"0.5 kg red" = ' + number(0.7, "kg")
+    r = rig("spaced", (*STAND, other, *HUNG[1:]), hung=2.0, top=TOP)
+    fitter, plant = at_work(r)
+    loads = []
+    for line in ("hang 0.5 kg", "hang 0.5 kg red", "hang side 0.5 kg", "hang side -"):
+        assert fitter.request(line).startswith("ok"), line
+        plant.run(5000)  # type: ignore[attr-defined]
+        loads.append(math.hypot(*plant._s.load[1:3]))  # type: ignore[attr-defined]
+    assert np.array(loads) / loads[0] == pytest.approx([1, 0.8 / 0.6, 0.98, 0.98 * 0.1 / 0.6])
+    assert fitter.request("hang 0.5 lb") == "error cannot 'hang 0.5 lb'"
+
+
 def test_weights_are_fixed_on_the_planes_own_scale() -> None:
     """The disc's scale begins 20 degrees on from the mark and runs backwards: 30 degrees on it are 20 - 30 from the mark in the
     direction of rotation, which here is clockwise (docs/reference/angles.md)."""

@@ -9,6 +9,7 @@ from bench.rigfile import RigFile
 from sim_backend.draws import uniform
 from sim_backend.machine import Truth, weight_in_air
 from sim_backend.machines.lira.plant import Plant
+from sim_backend.operator_line import words
 
 HAND_OVER_S: Final = 5.0
 TOUCHED: Final = ("OFF", "IDLE", "FAULT")
@@ -25,12 +26,13 @@ class Attendant:
     def __init__(self, rig: RigFile, plant: Plant, truth: Truth) -> None:
         self._plant, self._truth = plant, truth
         self._at = {name: _drawn(str(hook.at), truth.values) for name, hook in rig.hooks.items()}
+        self._masses = tuple(rig.masses)
         self._seat_m = rig.hook_seat.half_width or 0.0
         self.hung = 0
 
     def request(self, line: str) -> str:
         """One line: `hang HOOK M1`, `hang HOOK -`, `ask TEXT`. Answers `ok SECONDS`, `yes` or `error TEXT`."""
-        match line.split():
+        match words(line, self._masses):
             case ["ask", *_]:
                 return "yes"
             case ["hang", hook, label] if hook in self._at and (

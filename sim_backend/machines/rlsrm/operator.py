@@ -12,6 +12,7 @@ from sim_backend.load_cells import Cells
 from sim_backend.machine import Truth, weight_in_air
 from sim_backend.machines.rlsrm.device import StagePlant
 from sim_backend.machines.rlsrm.plant import AXES, TICKS_S
+from sim_backend.operator_line import words
 
 HAND_OVER_S: Final = 0.3  # how long it takes to let a mass go
 WORK_S: Final = 1.0
@@ -35,6 +36,7 @@ class Attendant:
     def __init__(self, rig: RigFile, plant: StagePlant, truth: Truth) -> None:
         self._plant, self._truth = plant, truth
         self._ends = {name: 1 if hook.along == "far" else -1 for name, hook in rig.hooks.items()}
+        self._masses = tuple(rig.masses)
         self._hung: dict[str, str] = {}  # labels by hook or side
         places = {name: lambda k=k: float(plant.core.place[k]) for k, name in enumerate(AXES)}
         self._instruments = Instruments(rig, truth, places, lambda: plant.core.tick / TICKS_S)
@@ -47,7 +49,7 @@ class Attendant:
         (both axes), `mount lock-along`, `mount lock-around`, `mount cells` (load cells in their place), `mount -` (all of these
         off), `wind above`, `wind below`, `read AXIS`, `cell AXIS`, `ask TEXT`. Answers
         `ok SECONDS` (when it will be done), `ok SECONDS NUMBER UNIT`, `yes` or `error TEXT`."""
-        match line.split():
+        match words(line, self._masses):
             case ["ask", *_]:
                 return "yes"
             case ["read", axis]:

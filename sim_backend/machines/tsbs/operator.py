@@ -5,6 +5,7 @@ from __future__ import annotations
 from sim_backend.draws import uniform
 from sim_backend.machine import Truth
 from sim_backend.machines.tsbs.plant import Plant
+from sim_backend.operator_line import words
 
 HAND_OVER_S = 0.3  # how long the operator takes to let a mass go
 
@@ -19,8 +20,8 @@ class SimulatedOperator:
     def request(self, line: str) -> str:
         """One line: `hang M2`, `hang -`, `lever left M2`, `lever left -`, `mount ring`, `mount -`, `ask TEXT`. Answers
         `ok SECONDS` (when it will be done), `yes` or `error TEXT`."""
-        words = line.split()
-        match [*words[:-1], "" if words[-1:] == ["-"] else "".join(words[-1:])]:
+        told = words(line, (name.removeprefix("masses.") for name in self._truth.values))
+        match [*told[:-1], "" if told[-1:] == ["-"] else "".join(told[-1:])]:
             case ["ask", *_]:
                 return "yes"
             case ["hang", label] if self._knows(label):

@@ -14,6 +14,7 @@ from sim_backend.machines.twin.layout import Geometry, layout_of
 from sim_backend.machines.twin.nominal import nominal_of
 from sim_backend.machines.twin.plant import TwinPlant
 from sim_backend.machines.twin.rules import drawn
+from sim_backend.operator_line import words
 
 WORK_S = 1.0
 HAND_OVER_S = 0.3  # how long it takes to let a mass go
@@ -40,7 +41,7 @@ class Fitter:
         file's directions count), `push -` (let go), `mount ring`, `mount -`, `ask TEXT`.
         Answers `ok SECONDS` (when it is done), `yes` or `error TEXT`."""
         hooks, planes = self._rig.hooks, list(self._rig.balancing)
-        match line.split():
+        match words(line, self._rig.masses):
             case ["ask", *_]:
                 return "yes"
             case ["hang", label] if hooks and self._knows(label):
