@@ -9,12 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+from bench.calibration import Calibration, Need
+from bench.errors import Lacking
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
+from bench.procedure.states import transition
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
@@ -26,6 +29,7 @@ from procedures.decoupling.estimates import Result, coupling_of, excursion_of, n
 from procedures.decoupling.plan import Plan
 from procedures.decoupling.steps import ALONE, FAST, NUDGED, SLOW, SPARE_S, STATE, read_runs
 from procedures.shared import assumptions
+from procedures.stages import map_model
 from procedures.stages.pairs import lacks, pairs, played, silenced, sine, waits_at
 
 PLACE = Quantity("excursion", "m", "largest distance of the held axis from its set point, by its encoder")
@@ -85,9 +89,35 @@ def nudge_of(axis: StageAxis, turns: float, plan: Plan) -> dict[str, float]:
     return sine(axis, plan.nudge_m if axis.unit == "m" else plan.nudge_rad, plan.period_s / turns)
 
 
+def needs(plan: Plan) -> tuple[Need, ...]:
+    """A map of inductances, where the controller is to be given one."""
+    return (Need(map_model.MAP, facts=tuple(map_model.WHOLE.values())),) if plan.model == "adopted" else ()
+
+
+def foresees(rig: RigFile, plan: Plan, facts: Mapping[str, Calibration]) -> Iterable[str]:
+    """A map that is not whole would leave the controller with a part of its own; one beyond its ranges is none of this kind."""
+    if plan.model == "adopted":
+        found = facts[map_model.MAP]
+        wanted, given = map_model.expected(rig), map_model.adopted(rig, found)
+        if missing := [quantity for name, quantity in wanted.items() if name not in given]:
+            yield f"model: the map of {found.run_id} holds no {', '.join(missing)}; expected all that the controller has"
+        yield from (f"model: {problem}" for problem in Envelope(rig).problems_of(given))
+
+
+def give_map(rig: Rig, record: Recorder) -> None:
+    """The adopted map to the controller, which takes one at rest alone; at each start it has its own again."""
+    assert rig.motion is not None
+    found = next(c for c in record.calibrations if c.procedure == map_model.MAP)
+    transition(rig, RigState.READY)
+    rig.motion.write(map_model.adopted(rig.file, found))
+    transition(rig, RigState.HELD)
+
+
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Each axis through its periods while the others are held, then with each of these nudged, slow and fast."""
     assert rig.motion is not None
+    if plan.model == "adopted":
+        give_map(rig, record)
     for name, value in plan.parameters.items():
         rig.motion.write({name: value})
     axes = axes_of(rig.file)
@@ -158,6 +188,11 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     if unknown := [name for name in plan.parameters if name not in rig.parameters]:
         yield f"parameters: found {', '.join(unknown)}; expected parameters of this rig"
         return
+    if plan.model == "adopted":
+        try:
+            map_model.expected(rig)
+        except Lacking as error:
+            yield from (f"model: {line}" for line in error.lines)
     if not (some := pairs(rig, plan.moved)):
         yield f"moved: found {plan.moved!r}; the rig has no axis that measures that"
     envelope = Envelope(rig)
@@ -206,6 +241,8 @@ procedure = Procedure(
     settings=settings,
     step_count=step_count,
     steps_on=steps_on,
+    needs=needs,
+    foresees=foresees,
     untold=untold,
     left_out=left_out,
     assumes=assumptions.DECOUPLING,

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from bench.calibration import Calibration
+from bench.errors import Lacking
 from bench.rigfile import RigFile
+from procedures.stages.stators import phases
 
+MAP = "inductance-map"
 WHOLE = {"map_slope": "slope", "map_unaligned": "unaligned", "map_c2": "c2", "map_c3": "c3", "map_length": "length",
          "map_overlap": "overlap", "map_fringe": "fringe", "map_leakage": "leakage", "map_saturation": "saturation",
          "map_centre": "centre"}  # fmt: skip
@@ -28,6 +32,24 @@ def parameters(
         for meaning, name in names(stators, phases).items()
         if meaning in model and name in values
     }
+
+
+def expected(rig: RigFile) -> dict[str, str]:
+    """What of an adopted map goes to which parameter of a rig's controller: parameter, quantity with its place.
+
+    Raises:
+        Lacking: the controller has no such map, or not all of it.
+    """
+    some, model = phases(rig), rig.capabilities.model
+    told = names(list(dict.fromkeys(p.motor for p in some)), [p.name for p in some])
+    if missing := [meaning for meaning in told if model.get(meaning) not in rig.parameters]:
+        raise Lacking(f"capabilities.model: found no {', '.join(missing)}; expected the controller's map of inductances")
+    return {model[meaning]: quantity for meaning, quantity in told.items()}
+
+
+def adopted(rig: RigFile, calibration: Calibration) -> dict[str, float]:
+    """The controller's map, SI by parameter, as a calibration by `inductance-map` has it; what that lacks is left out."""
+    return {name: calibration.values[q].value for name, q in expected(rig).items() if q in calibration.values}
 
 
 def present(rig: RigFile, meaning: str, otherwise: float) -> float:
