@@ -61,6 +61,8 @@ MEASURES = (PLACE, ANGLE, RATIO, PER_ANGLE, PER_STROKE, CROSS_FORCE, CROSS_TORQU
             PER_FORCE)  # fmt: skip
 INTEGRATORS = "integrators"
 STEPS_OF_A_PAIR = 3
+OWN = "default"
+"""The controller's own map, as its parameters are by default."""
 
 
 def step_count(plan: Plan) -> int:
@@ -90,24 +92,25 @@ def nudge_of(axis: StageAxis, turns: float, plan: Plan) -> dict[str, float]:
 
 
 def needs(plan: Plan) -> tuple[Need, ...]:
-    """A map of inductances, where the controller is to be given one."""
-    return (Need(map_model.MAP, facts=tuple(map_model.WHOLE.values())),) if plan.model == "adopted" else ()
+    """An identified map, where the controller is to be given one."""
+    return (Need(plan.model, told=True),) if plan.model != OWN else ()
 
 
 def foresees(rig: RigFile, plan: Plan, facts: Mapping[str, Calibration]) -> Iterable[str]:
     """A map that is not whole would leave the controller with a part of its own; one beyond its ranges is none of this kind."""
-    if plan.model == "adopted":
-        found = facts[map_model.MAP]
-        wanted, given = map_model.expected(rig), map_model.adopted(rig, found)
-        if missing := [quantity for name, quantity in wanted.items() if name not in given]:
-            yield f"model: the map of {found.run_id} holds no {', '.join(missing)}; expected all that the controller has"
-        yield from (f"model: {problem}" for problem in Envelope(rig).problems_of(given))
+    if plan.model == OWN:
+        return
+    found = facts[plan.model]
+    wanted, given = map_model.expected(rig, plan.model), map_model.adopted(rig, found)
+    if missing := [quantity for name, quantity in wanted.items() if name not in given]:
+        yield f"model: the map of {found.run_id} holds no {', '.join(missing)}; expected all that the controller has"
+    yield from (f"model: {problem}" for problem in Envelope(rig).problems_of(given))
 
 
-def give_map(rig: Rig, record: Recorder) -> None:
-    """The adopted map to the controller, which takes one at rest alone; at each start it has its own again."""
+def _give_map(rig: Rig, plan: Plan, record: Recorder) -> None:
+    """An identified map to the controller, which takes one at rest alone; at each start it has its own again."""
     assert rig.motion is not None
-    found = next(c for c in record.calibrations if c.procedure == map_model.MAP)
+    found = next(c for c in record.calibrations if c.procedure == plan.model)
     transition(rig, RigState.READY)
     rig.motion.write(map_model.adopted(rig.file, found))
     transition(rig, RigState.HELD)
@@ -116,8 +119,8 @@ def give_map(rig: Rig, record: Recorder) -> None:
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Each axis through its periods while the others are held, then with each of these nudged, slow and fast."""
     assert rig.motion is not None
-    if plan.model == "adopted":
-        give_map(rig, record)
+    if plan.model != OWN:
+        _give_map(rig, plan, record)
     for name, value in plan.parameters.items():
         rig.motion.write({name: value})
     axes = axes_of(rig.file)
@@ -188,9 +191,9 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     if unknown := [name for name in plan.parameters if name not in rig.parameters]:
         yield f"parameters: found {', '.join(unknown)}; expected parameters of this rig"
         return
-    if plan.model == "adopted":
+    if plan.model != OWN:
         try:
-            map_model.expected(rig)
+            map_model.expected(rig, plan.model)
         except Lacking as error:
             yield from (f"model: {line}" for line in error.lines)
     if not (some := pairs(rig, plan.moved)):

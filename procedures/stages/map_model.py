@@ -9,7 +9,8 @@ from bench.errors import Lacking
 from bench.rigfile import RigFile
 from procedures.stages.stators import phases
 
-MAP = "inductance-map"
+SOURCES = {"inductance-map": "", "static-characteristics": "static_"}
+"""Procedures that identify a map, and what the names of their quantities begin with."""
 WHOLE = {"map_slope": "slope", "map_unaligned": "unaligned", "map_c2": "c2", "map_c3": "c3", "map_length": "length",
          "map_overlap": "overlap", "map_fringe": "fringe", "map_leakage": "leakage", "map_saturation": "saturation",
          "map_centre": "centre"}  # fmt: skip
@@ -34,8 +35,9 @@ def parameters(
     }
 
 
-def expected(rig: RigFile) -> dict[str, str]:
-    """What of an adopted map goes to which parameter of a rig's controller: parameter, quantity with its place.
+def expected(rig: RigFile, by: str) -> dict[str, str]:
+    """What of a map that was identified `by` a procedure goes to which parameter of a rig's controller: parameter, quantity
+    with its place. A map by forces has no leakage, which makes none.
 
     Raises:
         Lacking: the controller has no such map, or not all of it.
@@ -43,13 +45,20 @@ def expected(rig: RigFile) -> dict[str, str]:
     some, model = phases(rig), rig.capabilities.model
     told = names(list(dict.fromkeys(p.motor for p in some)), [p.name for p in some])
     if missing := [meaning for meaning in told if model.get(meaning) not in rig.parameters]:
-        raise Lacking(f"capabilities.model: found no {', '.join(missing)}; expected the controller's map of inductances")
-    return {model[meaning]: quantity for meaning, quantity in told.items()}
+        raise Lacking(
+            f"capabilities.model: found no {', '.join(missing)}; expected the controller's map of inductances"
+        )
+    return {
+        model[meaning]: SOURCES[by] + quantity
+        for meaning, quantity in told.items()
+        if not (SOURCES[by] and meaning == "map_leakage")
+    }
 
 
 def adopted(rig: RigFile, calibration: Calibration) -> dict[str, float]:
-    """The controller's map, SI by parameter, as a calibration by `inductance-map` has it; what that lacks is left out."""
-    return {name: calibration.values[q].value for name, q in expected(rig).items() if q in calibration.values}
+    """The controller's map, SI by parameter, as a calibration by one of `SOURCES` has it; what that lacks is left out."""
+    wanted = expected(rig, calibration.procedure)
+    return {name: calibration.values[q].value for name, q in wanted.items() if q in calibration.values}
 
 
 def present(rig: RigFile, meaning: str, otherwise: float) -> float:
