@@ -31,12 +31,14 @@ RIG_TABLES = ("site", "geometry", "masses", "sensors", "machine", "hook")
 @dataclass(frozen=True)
 class Need:
     """A calibration that a run uses: of which procedure, the settings that it must have been made at, and the values that it
-    must have, by name. Without an `optional` one the run does; one that is there and does not fit is refused all the same."""
+    must have, by name. Without an `optional` one the run does; one that is there and does not fit is refused all the same. Of
+    one that is `told` the controller is told values, which no budget has: the model of a campaign will do."""
 
     procedure: str
     settings: Mapping[str, float] = field(default_factory=dict)
     optional: bool = False
     facts: tuple[str, ...] = ()
+    told: bool = False
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from datetime import datetime
 
 from bench.calibration.calibration import Calibration, Need, changed_certificates, settings_differ
@@ -14,13 +14,15 @@ from bench.rigfile import RigFile
 
 @dataclass(frozen=True)
 class Lookup:
-    """Where to look, and by which clock. `remedy` gives the command lines that make the calibration that is needed."""
+    """Where to look, and by which clock. `remedy` gives the command lines that make the calibration that is needed; `given`,
+    by procedure, go before what lies in the store."""
 
     store: Store
     rig: RigFile
     now: datetime
     remedy: Callable[[Need], str]
     allow_expired: bool = False
+    given: Mapping[str, Calibration] = field(default_factory=dict)
 
     def found(self, procedure: str, needs: Sequence[Need]) -> tuple[Calibration, ...]:
         """The current calibrations that a procedure needs, in the order of its needs.
@@ -43,7 +45,7 @@ class Lookup:
     def _problems(self, need: Need, problems: list[str]) -> Calibration | None:
         """The calibration; what is wrong with it is added to `problems`."""
         try:
-            calibration = self.store.current(need.procedure)
+            calibration = self.given.get(need.procedure) or self.store.current(need.procedure)
         except ConfigError as error:
             problems.append(f"{error}\n    next: {self.remedy(need)}")
             return None

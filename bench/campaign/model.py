@@ -120,12 +120,12 @@ class Model:
     given: tuple[Given, ...]
 
 
-_MODEL: TypeAdapter[Model] = TypeAdapter(Model)
+MODEL: TypeAdapter[Model] = TypeAdapter(Model)
 
 
 def json_schema() -> dict[str, Any]:
     """The JSON Schema that ships as `model.schema.json`."""
-    found = _MODEL.json_schema(mode="serialization")
+    found = MODEL.json_schema(mode="serialization")
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **found}
 
 

@@ -113,6 +113,7 @@ def run(
     operator: o.Operator = None,
     no_report: o.NoReport = False,
     calibrations: o.Calibrations = None,
+    model: o.Model = None,
     allow_expired: o.AllowExpired = False,
     spec: o.Spec = None,
     require_verdict: o.RequireVerdict = False,
@@ -132,7 +133,8 @@ def run(
         procedure=procedure, rig=rig, backend=named, seed=seed, visit=visit, links=tuple(link or ()),
         plan=tuple(plan or ()), plan_file=plan_file, truth=tuple(truth or ()), faults=tuple(fault or ()),
         clear_fault=clear_fault, out=out, operator=operator.value if operator else None, report=not no_report,
-        calibrations=calibrations, allow_expired=allow_expired, spec=spec, require_verdict=require_verdict, continues=go_on,
+        calibrations=calibrations, model=model, allow_expired=allow_expired, spec=spec, require_verdict=require_verdict,
+        continues=go_on,
     )  # fmt: skip
     return run_command(asked, verbose, asked_page(live, live_port, live_bind))
 

@@ -16,7 +16,7 @@ from datetime import UTC, datetime
 from functools import partial
 from typing import Any
 
-from bench.calibration import Need, number
+from bench.calibration import Calibration, Need, number
 from bench.calibration.lookup import Lookup
 from bench.calibration.store import Store
 from bench.cli import continuing
@@ -33,6 +33,7 @@ from bench.recording.earlier import Earlier
 from bench.rigfile import RigFile, linkurl, load_rig
 from bench.rigfile.envelope import Envelope
 from bench.run import stopped
+from bench.run.adoption import due
 from bench.run.job import Connect, Job
 
 __all__ = ["Request", "planned", "prepare", "simulated", "with_links"]
@@ -91,10 +92,36 @@ def prepare(request: Request, asking: Asking = quietly) -> tuple[Job, Connect]:
         datetime.now(UTC),
         partial(remedy, request),
         request.allow_expired,
+        of_model(request, rig, seed, procedure.needs(plan)),
     )
     used = lookup.found(procedure.name, procedure.needs(plan))
     procedure.refuse_by(rig, plan, used)
     return _job(request, Job(procedure, rig, plan, limits, request.backend, seed, None, used, judged), asking)
+
+
+def of_model(request: Request, rig: RigFile, seed: int | None, needs: Sequence[Need]) -> dict[str, Calibration]:
+    """What the model of `--model` has of that which the controller is told, by procedure.
+
+    Raises:
+        ConfigError: no model, of another machine or rig file, or without that; or the plan has the controller told nothing.
+    """
+    from bench.campaign import told as campaign_told
+
+    path, told = request.model, [n.procedure for n in needs if n.told]
+    if path is None:
+        return {}
+    if not told:
+        raise ConfigError(f"--model {path}: with this plan {request.procedure} tells the controller nothing of it. Next: a "
+                          "procedure and a plan that do, such as `bench run decoupling --plan 'model=\"inductance-map\"'`")  # fmt: skip
+    model, sha256 = campaign_told.read(path)
+    found = {name: campaign_told.calibration(model, name, sha256) for name in told}
+    problems = campaign_told.refusals(model, rig, seed) or [
+        f"found no constants by {name}; expected those that the controller is to be told"
+        for name, c in found.items() if c is None
+    ]  # fmt: skip
+    if problems:
+        raise ConfigError("\n  ".join([f"--model {path} cannot be used; nothing was started:", *problems]))
+    return {name: replace(c, due=due(rig, name, datetime.fromisoformat(c.date))) for name, c in found.items() if c}
 
 
 def _going_on(request: Request, earlier: Earlier, asking: Asking) -> tuple[Job, Connect]:

@@ -120,8 +120,8 @@ def _contradicting(request: Request, recording: Recording[Any], before: Asked) -
     for option, (typed, stored) in then.items():
         if typed not in ("", None, (), stored):
             yield f"{option}: found {_told(typed)}; the stopped run has {_told(stored)}"
-    if request.spec is not None or request.calibrations is not None:
-        name = "--spec" if request.spec is not None else "--calibrations"
+    given = {"--spec": request.spec, "--calibrations": request.calibrations, "--model": request.model}
+    for name in (name for name, path in given.items() if path is not None):
         yield f"{name}: expected none; limits and calibrations are those of the stopped run"
     if request.require_verdict and not recording.verdict_required:
         yield "--require-verdict: the stopped run was not to give one"

@@ -48,6 +48,10 @@ Calibrations = Annotated[
     Path | None,
     typer.Option("--calibrations", metavar="DIR", help="Folder of calibrations; default beside the rig file."),
 ]
+Model = Annotated[
+    Path | None,
+    typer.Option("--model", metavar="FILE", help="The model.json of a campaign, to tell the controller what it has."),
+]
 Live = Annotated[bool, typer.Option("--live", help="Show what happens on a page; its address is printed.")]
 LivePort = Annotated[
     int | None, typer.Option("--live-port", min=0, max=65535, help="Of the live page; default any free one.")

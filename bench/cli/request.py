@@ -25,6 +25,7 @@ class Request:
     operator: str | None = None
     report: bool = True
     calibrations: Path | None = None
+    model: Path | None = None
     allow_expired: bool = False
     spec: Path | None = None
     require_verdict: bool = False

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Literal
 
 from pydantic import Field
 
@@ -15,6 +16,9 @@ class Plan(BenchPlan):
 
     moved: Moved = "all"  # which axes are moved, one after the other
     integrators: str = "on"  # of the rig's capabilities.settings.integrators; "": as the controller is set
+    model: Literal["default", "inductance-map", "static-characteristics"] = (
+        "default"  # whose map the controller shares by
+    )
     parameters: dict[str, float] = Field(default_factory=dict)  # of the controller, once the axes are held
     amplitude_m: float = Field(10e-3, gt=0)
     amplitude_rad: float = Field(math.radians(200), gt=0)

@@ -9,12 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+from bench.calibration import Calibration, Need
+from bench.errors import Lacking
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
+from bench.procedure.states import transition
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
@@ -26,6 +29,7 @@ from procedures.decoupling.estimates import Result, coupling_of, excursion_of, n
 from procedures.decoupling.plan import Plan
 from procedures.decoupling.steps import ALONE, FAST, NUDGED, SLOW, SPARE_S, STATE, read_runs
 from procedures.shared import assumptions
+from procedures.stages import map_model
 from procedures.stages.pairs import lacks, pairs, played, silenced, sine, waits_at
 
 PLACE = Quantity("excursion", "m", "largest distance of the held axis from its set point, by its encoder")
@@ -57,6 +61,8 @@ MEASURES = (PLACE, ANGLE, RATIO, PER_ANGLE, PER_STROKE, CROSS_FORCE, CROSS_TORQU
             PER_FORCE)  # fmt: skip
 INTEGRATORS = "integrators"
 STEPS_OF_A_PAIR = 3
+OWN = "default"
+"""The controller's own map, as its parameters are by default."""
 
 
 def step_count(plan: Plan) -> int:
@@ -85,9 +91,36 @@ def nudge_of(axis: StageAxis, turns: float, plan: Plan) -> dict[str, float]:
     return sine(axis, plan.nudge_m if axis.unit == "m" else plan.nudge_rad, plan.period_s / turns)
 
 
+def needs(plan: Plan) -> tuple[Need, ...]:
+    """An identified map, where the controller is to be given one."""
+    return (Need(plan.model, told=True),) if plan.model != OWN else ()
+
+
+def foresees(rig: RigFile, plan: Plan, facts: Mapping[str, Calibration]) -> Iterable[str]:
+    """A map that is not whole would leave the controller with a part of its own; one beyond its ranges is none of this kind."""
+    if plan.model == OWN:
+        return
+    found = facts[plan.model]
+    wanted, given = map_model.expected(rig, plan.model), map_model.adopted(rig, found)
+    if missing := [quantity for name, quantity in wanted.items() if name not in given]:
+        yield f"model: the map of {found.run_id} holds no {', '.join(missing)}; expected all that the controller has"
+    yield from (f"model: {problem}" for problem in Envelope(rig).problems_of(given))
+
+
+def _give_map(rig: Rig, plan: Plan, record: Recorder) -> None:
+    """An identified map to the controller, which takes one at rest alone; at each start it has its own again."""
+    assert rig.motion is not None
+    found = next(c for c in record.calibrations if c.procedure == plan.model)
+    transition(rig, RigState.READY)
+    rig.motion.write(map_model.adopted(rig.file, found))
+    transition(rig, RigState.HELD)
+
+
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Each axis through its periods while the others are held, then with each of these nudged, slow and fast."""
     assert rig.motion is not None
+    if plan.model != OWN:
+        _give_map(rig, plan, record)
     for name, value in plan.parameters.items():
         rig.motion.write({name: value})
     axes = axes_of(rig.file)
@@ -158,6 +191,11 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     if unknown := [name for name in plan.parameters if name not in rig.parameters]:
         yield f"parameters: found {', '.join(unknown)}; expected parameters of this rig"
         return
+    if plan.model != OWN:
+        try:
+            map_model.expected(rig, plan.model)
+        except Lacking as error:
+            yield from (f"model: {line}" for line in error.lines)
     if not (some := pairs(rig, plan.moved)):
         yield f"moved: found {plan.moved!r}; the rig has no axis that measures that"
     envelope = Envelope(rig)
@@ -206,6 +244,8 @@ procedure = Procedure(
     settings=settings,
     step_count=step_count,
     steps_on=steps_on,
+    needs=needs,
+    foresees=foresees,
     untold=untold,
     left_out=left_out,
     assumes=assumptions.DECOUPLING,
