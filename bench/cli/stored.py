@@ -24,8 +24,9 @@ def adopt(
     The last line on standard output is its file.
     """
     from bench.cli.adopt import adopt_command
+    from bench.cli.meant import ended
 
-    return adopt_command(run, rig, calibrations, anyway, procedure)
+    return adopt_command(ended(run), rig, calibrations, anyway, procedure)
 
 
 def calibrations(
@@ -44,15 +45,17 @@ def analyse(run: RunArgument, verbose: Verbose = False, procedure: ProcedureFile
     Writes RUN/analyses/<UTC>/record.json; the original stays as it is.
     """
     from bench.cli.analyse import analyse_command
+    from bench.cli.meant import ended
 
-    return analyse_command(run, verbose, procedure)
+    return analyse_command(ended(run), verbose, procedure)
 
 
 def report(run: RunArgument, procedure: ProcedureFile = "") -> int:
     """Build the report of a stored run again."""
     from bench.cli.analyse import report_command
+    from bench.cli.meant import ended
 
-    return report_command(run, procedure)
+    return report_command(ended(run), procedure)
 
 
 def runs(
@@ -145,5 +148,6 @@ def export(
     One file per stream and per figure, in RUN/export.
     """
     from bench.cli.export import export_command
+    from bench.cli.meant import ended
 
-    return export_command(run, to.value, procedure)
+    return export_command(ended(run), to.value, procedure)
