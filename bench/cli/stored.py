@@ -61,9 +61,9 @@ def report(run: RunArgument, procedure: ProcedureFile = "") -> int:
 def runs(
     out: Out = Path("runs"),
     procedure: Annotated[
-        str | None, typer.Option("--procedure", metavar="NAME", help="Of this procedure alone.")
+        str | None, typer.Option("--procedure", metavar="PROCEDURE", help="Of this procedure alone.")
     ] = None,
-    rig: Annotated[str | None, typer.Option("--rig", metavar="NAME", help="Of the rig of this name alone.")] = None,
+    rig: Annotated[str | None, typer.Option("--rig", metavar="RIG", help="Of the rig of this name alone.")] = None,
     failed: Annotated[bool, typer.Option("--failed", help="Those alone that ended neither PASS nor DONE.")] = False,
     last: Annotated[int | None, typer.Option("--last", metavar="N", min=1, help="The newest so many.")] = None,
     show: Annotated[
@@ -115,10 +115,10 @@ def compare(
 def trend(
     quantity: Annotated[str, typer.Argument(metavar="QUANTITY", help="A name of results, as K_i or K@inboard.")],
     rig: Annotated[
-        str | None, typer.Option("--rig", metavar="NAME", help="Only runs of this rig, as records name it.")
+        str | None, typer.Option("--rig", metavar="RIG", help="Only runs of this rig, as records name it.")
     ] = None,
     procedure: Annotated[
-        str | None, typer.Option("--procedure", metavar="NAME", help="Only runs of this procedure.")
+        str | None, typer.Option("--procedure", metavar="PROCEDURE", help="Only runs of this procedure.")
     ] = None,
     seed: Annotated[int | None, typer.Option("--seed", min=0, help="Only runs of this virtual machine.")] = None,
     out: Out = Path("runs"),

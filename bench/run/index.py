@@ -24,7 +24,9 @@ NAME = "index.sqlite"
 VERSION = 4  # of the tables; another one is rebuilt
 SOUND = ("PASS", "DONE")
 TICK_NS = 1_000_000_000  # two changes of a folder that are nearer may have one time
-LISTED_NS = 10_000_000_000  # an index that knows all of its folder is made so much older than that: nothing else makes it so
+LISTED_NS = (
+    10_000_000_000  # an index that knows all of its folder is made so much older than that: nothing else makes it so
+)
 T = TypeVar("T")
 log = logging.getLogger(__name__)
 
@@ -186,7 +188,9 @@ def _take_in(db: sqlite3.Connection, root: Path) -> None:
             for row in rows:
                 _put(db, row)
             db.commit()
-        except sqlite3.OperationalError as error:  # a folder of somebody else's, or one in which somebody writes for long
+        except (
+            sqlite3.OperationalError
+        ) as error:  # a folder of somebody else's, or one in which somebody writes for long
             db.rollback()
             log.warning(f"{own}: {len(new)} runs are left out of the index: {error}")
             return
