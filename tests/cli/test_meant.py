@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from tests.cli.in_process import Bench, bench_in_process
 
 from bench import lock
 from bench.cli.meant import meant
+from tests.cli.in_process import Bench, bench_in_process
 
 QUICK = ("--plan", "angles=1", "--plan", "rounds=1", "--plan", "settle_s=0.3", "--plan", "average_s=0.2", "--no-report")
 
