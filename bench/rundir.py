@@ -128,5 +128,10 @@ def runs_in(out: Path) -> Iterator[RunDirectory]:
     if not out.is_dir():
         return
     for path in sorted(out.iterdir()):
-        if NAME.fullmatch(path.name) and not path.name.startswith(f"{LISTENED}-") and path.is_dir():
+        if named_as_run(path.name) and path.is_dir():
             yield RunDirectory(path)
+
+
+def named_as_run(name: str) -> bool:
+    """Whether a directory of that name is a run's."""
+    return NAME.fullmatch(name) is not None and not name.startswith(f"{LISTENED}-")

@@ -33,7 +33,7 @@ def require_schema(text: str, name: str, kind: str, schema: int, oldest: int | N
     if type(found) is not int:
         raise ConfigError(f"{name}: not a {kind}: found no schema number; expected schema = {schema}")
     if not (oldest or schema) <= found <= schema:
-        newer = " It was written by a newer Levbench." if found > schema else ""
+        newer = " It was written by a newer Levbench. Next: update this one" if found > schema else ""
         raise ConfigError(f"{name}: schema: found {found}; expected {schema}.{newer}")
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import os
 import shutil
 import sqlite3
 from contextlib import closing
@@ -11,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from bench import lock
 from bench.cli.runs import RunsRequest, runs_command
 from bench.errors import ConfigError
 from bench.findings import SIMULATED_CONTROLLER, Finding
@@ -25,7 +27,7 @@ from bench.uncertainty import Estimate, Influence
 
 def run(root: Path, second: int, outcome: Outcome = Outcome.PASS) -> Path:
     path = root / f"amb-calibration-20260101T0000{second:02}Z-3f2a"
-    path.mkdir(exist_ok=True)
+    path.mkdir(exist_ok=True, parents=True)
     record = unfinished(run_id=path.name, procedure="amb-calibration", rig="tsbs12", uut={}, seed=None, plan={},
                         started=f"2026-01-01T00:00:{second:02}Z", versions={})  # fmt: skip
     write_record(path / "record.json", dataclasses.replace(record, outcome=outcome))
@@ -101,6 +103,59 @@ def test_deleted_runs_are_not_listed(tmp_path: Path) -> None:
     shutil.rmtree(run(tmp_path, 1))
     assert outcomes(tmp_path) == []
     assert index.entries(tmp_path / "nothing") == []
+
+
+def test_runs_that_nobody_put_in_are_listed(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """Of a process that was killed, or copied from elsewhere: once the folder is listed, and again when it has changed."""
+    index.add(run(tmp_path, 1))
+    run(tmp_path, 2, Outcome.ERROR)
+    assert outcomes(tmp_path) == ["PASS", "ERROR"]
+    os.utime(tmp_path, ns=(0, 10**18))  # long ago: as if nothing had changed since
+    assert outcomes(tmp_path) == ["PASS", "ERROR"]
+    (tmp_path / "amb-calibration-20260101T000003Z-3f2a").mkdir()
+    assert outcomes(tmp_path) == ["PASS", "ERROR"]
+    assert "000003Z-3f2a: left out of the index" in caplog.text
+    copied = measuring(tmp_path / "elsewhere", 4, 71.0)
+    shutil.move(copied, tmp_path / copied.name)
+    assert [r.value for r in index.results(tmp_path, quantity="K_i")] == [71.0]
+    assert outcomes(tmp_path) == ["PASS", "ERROR", "PASS"]
+
+
+def test_a_folder_that_has_not_changed_is_not_listed_again(tmp_path: Path) -> None:
+    index.add(run(tmp_path, 1))
+    os.utime(tmp_path, ns=(0, 10**18))
+    assert outcomes(tmp_path) == ["PASS"]
+    run(tmp_path, 2)
+    os.utime(tmp_path, ns=(0, 10**18))  # as no folder is that got a new entry
+    assert outcomes(tmp_path) == ["PASS"]
+    os.utime(tmp_path, ns=(0, 2 * 10**18))
+    assert outcomes(tmp_path) == ["PASS", "PASS"]
+
+
+@pytest.mark.parametrize("rebuilt", [False, True])
+def test_a_run_that_goes_on_is_listed_when_it_has_ended(rebuilt: bool, tmp_path: Path) -> None:
+    index.add(run(tmp_path, 1))
+    going = run(tmp_path, 2, Outcome.ERROR)
+    (going / "recording.mcap").touch()
+    os.utime(tmp_path, ns=(0, 10**18))
+    with (going / "recording.mcap").open("rb") as file:
+        lock.hold(file.fileno())
+        if rebuilt:
+            index.rebuild(tmp_path)
+        assert outcomes(tmp_path) == ["PASS"]
+        os.utime(tmp_path, ns=(0, 10**18))
+        assert outcomes(tmp_path) == ["PASS"]
+    assert outcomes(tmp_path) == ["PASS", "ERROR"]  # its process was killed: nothing has changed in the folder
+
+
+def test_an_index_that_cannot_be_written_answers_without_them(tmp_path: Path) -> None:
+    index.add(run(tmp_path, 1))
+    run(tmp_path, 2)
+    read_only = f"file:{tmp_path / index.NAME}?mode=ro"
+    with closing(sqlite3.connect(read_only, uri=True)) as db:
+        index._take_in(db, tmp_path)
+        assert db.execute("SELECT count(*) FROM runs").fetchone() == (1,)
+    assert outcomes(tmp_path) == ["PASS", "PASS"]
 
 
 def measuring(

@@ -126,6 +126,7 @@ def run(
     """Run a procedure on a rig, or go on with a run that was stopped. The last line on standard output is the run directory."""
     from bench.cli.compose import Request
     from bench.cli.live import asked_page
+    from bench.cli.meant import meant
     from bench.cli.run import run_command
 
     named = backend.value if backend else "" if go_on else "sim"
@@ -134,7 +135,7 @@ def run(
         plan=tuple(plan or ()), plan_file=plan_file, truth=tuple(truth or ()), faults=tuple(fault or ()),
         clear_fault=clear_fault, out=out, operator=operator.value if operator else None, report=not no_report,
         calibrations=calibrations, model=model, allow_expired=allow_expired, spec=spec, require_verdict=require_verdict,
-        continues=go_on,
+        continues=meant(go_on) if go_on else None,
     )  # fmt: skip
     return run_command(asked, verbose, asked_page(live, live_port, live_bind))
 

@@ -122,7 +122,7 @@ def _run(side: Side) -> str:
 def _differ(differ: Sequence[Differs], width: int, whole: bool) -> Iterator[str]:
     told = [d for d in differ if (d.what, d.key) not in (("rig", "seed"), ("rig", "visit"))]  # in the lines above
     if not told:
-        yield "  nothing else differs: plan, rig, parameters, firmware, certificates, versions"
+        yield "  all else is the same: plan, rig, parameters, firmware, certificates, versions"
     for d in told if whole else told[:SHOWN]:
         yield from _folded("  differs  ", f"{d.what}{f' {d.key}' if d.key else ''}: {d.a}, then {d.b}", width)
     if len(told) > SHOWN and not whole:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import logging
+import sqlite3
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from bench import catalogue, rundir
 
+SHELLS = ("bash", "zsh", "fish")
 HIDDEN = "_complete"
 """The command that the completion calls; nobody types it, and `--help` does not show it."""
 
@@ -40,6 +44,21 @@ def runs() -> Iterable[str]:
     return sorted(found, key=lambda path: path.split("-")[-2:], reverse=True)
 
 
+def kinds() -> Iterable[str]:
+    """Of schemas, as `bench schema` takes them."""
+    return ["rig", "spec", "campaign", *(f"plan-{name}" for name in procedures())]
+
+
+def quantities() -> Iterable[str]:
+    """Measured in ./runs; none where a key cannot have them: nothing is told in the middle of a line."""
+    from bench.run import index
+
+    logging.getLogger(index.__name__).setLevel(logging.ERROR)
+    with suppress(sqlite3.Error, OSError):
+        return index.names(Path("runs"))
+    return ()
+
+
 def _stems(*folders: Path) -> list[str]:
     return list(dict.fromkeys(path.stem for folder in folders for path in sorted(folder.glob("*.toml"))))
 
@@ -49,5 +68,10 @@ NAMES: Mapping[str, Callable[[], Iterable[str]]] = {
     "RIG": rigs,
     "FILE": campaigns,
     "RUN": runs,
+    "A": runs,
+    "B": runs,
+    "QUANTITY": quantities,
+    "KIND": kinds,
+    "SHELL": lambda: SHELLS,
 }
 """By what `--help` calls a value."""

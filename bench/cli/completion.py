@@ -16,10 +16,9 @@ from typing import Any, get_args, get_type_hints
 
 import typer
 
-from bench.cli.completing import HIDDEN, NAMES
+from bench.cli.completing import HIDDEN, NAMES, SHELLS
 from bench.errors import ConfigError
 
-SHELLS = ("bash", "zsh", "fish")
 ADDED = {
     "bash": 'eval "$(bench completion bash)"  # in ~/.bashrc',
     "zsh": 'eval "$(bench completion zsh)"  # in ~/.zshrc, after compinit',

@@ -71,7 +71,9 @@ ProcedureFile = Annotated[
         "--procedure", metavar="FILE", help="The file of the procedure, if the run was made by one in a file."
     ),
 ]
-RunArgument = Annotated[Path, typer.Argument(metavar="RUN", help="A run directory.")]
+RunArgument = Annotated[
+    str, typer.Argument(metavar="RUN", help="A run directory; in ./runs a run's name or its beginning, last, last~1.")
+]
 RigArgument = Annotated[str, typer.Argument(metavar="RIG", help="A rig file, or its name in rigs/.")]
 RigOption = Annotated[str, typer.Option("--rig", metavar="RIG", help="A rig file, or its name in rigs/.")]
 Seed = Annotated[int | None, typer.Option(min=0, help="Which virtual rig (simulation only; default 0).")]
@@ -90,7 +92,7 @@ Faults = Annotated[list[str] | None, typer.Option("--fault", metavar="FAULT", he
 ClearFault = Annotated[bool, typer.Option("--clear-fault", help="Clear a fault that an earlier run left (live only).")]
 Operator = Annotated[OperatorKind | None, typer.Option(help="Default: auto in simulation, console on a terminal.")]
 GoOn = Annotated[
-    Path | None, typer.Option("--continue", metavar="RUN", help="Go on with a run that was stopped, as it was begun.")
+    str | None, typer.Option("--continue", metavar="RUN", help="Go on with a run that was stopped, as it was begun.")
 ]
 NoReport = Annotated[bool, typer.Option("--no-report", help="Leave the report out.")]
 AllowExpired = Annotated[

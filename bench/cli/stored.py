@@ -24,8 +24,9 @@ def adopt(
     The last line on standard output is its file.
     """
     from bench.cli.adopt import adopt_command
+    from bench.cli.meant import ended
 
-    return adopt_command(run, rig, calibrations, anyway, procedure)
+    return adopt_command(ended(run), rig, calibrations, anyway, procedure)
 
 
 def calibrations(
@@ -44,23 +45,25 @@ def analyse(run: RunArgument, verbose: Verbose = False, procedure: ProcedureFile
     Writes RUN/analyses/<UTC>/record.json; the original stays as it is.
     """
     from bench.cli.analyse import analyse_command
+    from bench.cli.meant import ended
 
-    return analyse_command(run, verbose, procedure)
+    return analyse_command(ended(run), verbose, procedure)
 
 
 def report(run: RunArgument, procedure: ProcedureFile = "") -> int:
     """Build the report of a stored run again."""
     from bench.cli.analyse import report_command
+    from bench.cli.meant import ended
 
-    return report_command(run, procedure)
+    return report_command(ended(run), procedure)
 
 
 def runs(
     out: Out = Path("runs"),
     procedure: Annotated[
-        str | None, typer.Option("--procedure", metavar="NAME", help="Of this procedure alone.")
+        str | None, typer.Option("--procedure", metavar="PROCEDURE", help="Of this procedure alone.")
     ] = None,
-    rig: Annotated[str | None, typer.Option("--rig", metavar="NAME", help="Of the rig of this name alone.")] = None,
+    rig: Annotated[str | None, typer.Option("--rig", metavar="RIG", help="Of the rig of this name alone.")] = None,
     failed: Annotated[bool, typer.Option("--failed", help="Those alone that ended neither PASS nor DONE.")] = False,
     last: Annotated[int | None, typer.Option("--last", metavar="N", min=1, help="The newest so many.")] = None,
     show: Annotated[
@@ -112,10 +115,10 @@ def compare(
 def trend(
     quantity: Annotated[str, typer.Argument(metavar="QUANTITY", help="A name of results, as K_i or K@inboard.")],
     rig: Annotated[
-        str | None, typer.Option("--rig", metavar="NAME", help="Only runs of this rig, as records name it.")
+        str | None, typer.Option("--rig", metavar="RIG", help="Only runs of this rig, as records name it.")
     ] = None,
     procedure: Annotated[
-        str | None, typer.Option("--procedure", metavar="NAME", help="Only runs of this procedure.")
+        str | None, typer.Option("--procedure", metavar="PROCEDURE", help="Only runs of this procedure.")
     ] = None,
     seed: Annotated[int | None, typer.Option("--seed", min=0, help="Only runs of this virtual machine.")] = None,
     out: Out = Path("runs"),
@@ -145,5 +148,6 @@ def export(
     One file per stream and per figure, in RUN/export.
     """
     from bench.cli.export import export_command
+    from bench.cli.meant import ended
 
-    return export_command(run, to.value, procedure)
+    return export_command(ended(run), to.value, procedure)

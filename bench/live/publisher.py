@@ -15,7 +15,7 @@ from bench.samples import SampleBlock
 
 logger = logging.getLogger("bench.live")
 PERIOD_S = 0.05
-OLD_NS = 300_000_000  # what was taken by nobody for so long is not shown any more
+OLD_NS = 300_000_000  # of a machine that moves: what was taken by nobody for so long is not shown any more
 
 
 class Source(Protocol):
@@ -46,7 +46,8 @@ class Publisher:
             return
         tap, buckets, real_time = self._watched
         now = time.monotonic_ns()
-        taken = tap.take(now - OLD_NS)
+        # A simulation stands still while somebody is asked: who looks then sees where it stands, and how long ago that was.
+        taken = tap.take(now - OLD_NS if real_time else 0)
         if taken:
             came_ns, newest = max((blocks[-1] for blocks in taken.values()), key=lambda one: one[0])
             age_ms = (time.time_ns() - newest.host_ns if real_time else now - came_ns) * 1e-6

@@ -8,8 +8,9 @@ import json
 import logging
 import os
 import sqlite3
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing, contextmanager
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import closing, contextmanager, suppress
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
@@ -17,11 +18,15 @@ from typing import Any, TypeVar
 
 from bench.errors import ConfigError
 from bench.run.indexrow import IndexEntry, MadeWith, Result, Row
-from bench.rundir import RunDirectory, runs_in
+from bench.rundir import RunDirectory, named_as_run, runs_in
 
 NAME = "index.sqlite"
 VERSION = 5  # of the tables; another one is rebuilt
 SOUND = ("PASS", "DONE")
+TICK_NS = 1_000_000_000  # two changes of a folder that are nearer may have one time
+LISTED_NS = (
+    10_000_000_000  # an index that knows all of its folder is made so much older than that: nothing else makes it so
+)
 T = TypeVar("T")
 log = logging.getLogger(__name__)
 
@@ -77,7 +82,7 @@ def entries(
     where, values = _chosen(procedure, rig, failed)
     query = f"SELECT {RUN_COLUMNS} FROM runs r {where} ORDER BY started {{0}}, r.run_id {{0}}"
     with uncollected():
-        return [IndexEntry._make(row) for row in _answered(root, lambda db: _there(db, root, query, values, last))]
+        return [IndexEntry._make(row) for row in _read(root, lambda db: _there(db, root, query, values, last))]
 
 
 def results(
@@ -106,7 +111,7 @@ def results(
         return _there(db, root, query, values, last if of is None else len(of))
 
     with uncollected():
-        return [Result._make((*row, root)) for row in _answered(root, asked)]
+        return [Result._make((*row, root)) for row in _read(root, asked)]
 
 
 def names(root: Path) -> list[str]:
@@ -114,7 +119,7 @@ def names(root: Path) -> list[str]:
     if not root.is_dir():
         return []
     query = "SELECT name FROM names UNION SELECT full FROM names ORDER BY 1"
-    return _answered(root, lambda db: [str(name) for (name,) in db.execute(query)])
+    return _read(root, lambda db: [str(name) for (name,) in db.execute(query)])
 
 
 def _meant(db: sqlite3.Connection, asked: str) -> list[int]:
@@ -157,6 +162,66 @@ def _there(
     return [row for rows in reversed(kept) for row in reversed(rows)]
 
 
+def _read(root: Path, ask: Callable[[sqlite3.Connection], T]) -> T:
+    """As `_answered`, of all runs that are there: also of those that nobody put in."""
+
+    def asked(db: sqlite3.Connection) -> T:
+        _take_in(db, root)
+        return ask(db)
+
+    return _answered(root, asked)
+
+
+def _take_in(db: sqlite3.Connection, root: Path) -> None:
+    """Put in the runs of processes that were killed, and those that were copied here. The folder is listed where something was
+    made in it, or taken away, since it was listed last: the time of the index's file tells."""
+    own, changed_ns = root / NAME, root.stat().st_mtime_ns
+    if own.stat().st_mtime_ns == changed_ns - LISTED_NS:
+        return
+    known = {run_id for (run_id,) in db.execute("SELECT run_id FROM runs")}
+    new = sorted(name for name in set(os.listdir(root)) - known if named_as_run(name))
+    messages: list[str] = []
+    if new:
+        try:
+            db.execute("BEGIN IMMEDIATE")  # a run that ends meanwhile puts itself in afterwards, in place of this
+            rows = list(_ended(new, root, messages))
+            for row in rows:
+                _put(db, row)
+            db.commit()
+        except (
+            sqlite3.OperationalError
+        ) as error:  # a folder of somebody else's, or one in which somebody writes for long
+            db.rollback()
+            log.warning(f"{own}: {len(new)} runs are left out of the index: {error}")
+            return
+        for message in messages:
+            log.warning(message)
+        if len(rows) + len(messages) < len(new):
+            return  # one that goes on may be killed, and nothing in the folder would change
+    if time.time_ns() - changed_ns > TICK_NS:
+        with suppress(OSError):
+            os.utime(own, ns=(changed_ns, changed_ns - LISTED_NS))
+
+
+def _ended(names: Iterable[str], root: Path, messages: list[str]) -> Iterator[Row]:
+    """What the index keeps of runs, without those that are being written; those that cannot be read are named in `messages`."""
+    from bench.lock import is_held
+    from bench.run.indexed import row
+
+    for name in names:
+        run = RunDirectory(root / name)
+        try:
+            found = row(run)
+        except ConfigError as error:
+            messages.append(f"{run.path}: left out of the index: {error}")
+            continue
+        if found.entry.ended is None:
+            with suppress(OSError):  # no recording: it was killed before it began
+                if is_held(run.recording):
+                    continue
+        yield found
+
+
 def _answered(root: Path, ask: Callable[[sqlite3.Connection], T]) -> T:
     """What the index answers. One that is missing, of another version or corrupt is rebuilt first: that shows where it is read,
     as a check of the whole would take longer than any answer."""
@@ -176,8 +241,6 @@ def _answered(root: Path, ask: Callable[[sqlite3.Connection], T]) -> T:
 
 
 def _filled(root: Path) -> list[str]:
-    from bench.run.indexed import row
-
     messages: list[str] = []
     with _opened(root) as db:
         db.execute("BEGIN IMMEDIATE")  # before the records are read: another process adds before or after, not between
@@ -185,11 +248,8 @@ def _filled(root: Path) -> list[str]:
             db.execute(f"DROP TABLE IF EXISTS {table}")
         for statement in filter(str.strip, TABLES.split(";")):
             db.execute(statement)
-        for run in runs_in(root):
-            try:
-                _put(db, row(run))
-            except ConfigError as error:
-                messages.append(f"{run.path}: left out of the index: {error}")
+        for found in _ended((run.run_id for run in runs_in(root)), root, messages):
+            _put(db, found)
         db.execute(f"PRAGMA user_version = {VERSION}")
     for message in messages:
         log.warning(message)

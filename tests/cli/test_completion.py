@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from bench import catalogue
+from bench.cli import completing, schemas
 from bench.cli.__main__ import app
 from bench.cli.completion import commands_of
 
@@ -43,6 +44,11 @@ def offered(words: str, folder: Path) -> list[str]:
         ("bench export --to m", ["mcap", "mdf"]),
         ("bench serve mine", ["mine"]),
         ("bench run step --spec ''", []),
+        ("bench completion z", ["zsh"]),
+        ("bench schema plan-unb", ["plan-unbalance"]),
+        ("bench runs --procedure unbal", ["unbalance"]),
+        ("bench trend K_i --rig tsbs12-d", ["tsbs12-drag"]),
+        ("bench trend ''", []),
     ],
 )
 def test_bash_offers_what_fits(words: str, expected: list[str], tmp_path: Path) -> None:
@@ -59,15 +65,31 @@ def test_runs_are_offered_the_newest_first(tmp_path: Path) -> None:
         "mine",
     ):
         (tmp_path / "runs" / name).mkdir(parents=True)
-    assert offered("bench report ''", tmp_path) == [
-        "runs/unbalance-20260301T000000Z-0001",
-        "runs/step-20260101T000000Z-0000",
-    ]
+    found = ["runs/unbalance-20260301T000000Z-0001", "runs/step-20260101T000000Z-0000"]
+    for words in ("bench report ''", "bench run --continue ''", "bench compare runs/s ''"):
+        assert list(dict.fromkeys(offered(words, tmp_path))) == found
+
+
+def test_quantities_are_those_that_were_measured(tmp_path: Path) -> None:
+    from tests.test_index import measuring
+
+    measuring(tmp_path / "runs", 1, 71.0)
+    for words in ("bench trend K", "bench runs --show K"):
+        assert offered(words, tmp_path) == ["K_i"]
+    (tmp_path / "runs" / "amb-calibration-20260101T000002Z-3f2a").mkdir()  # what it cannot read is told elsewhere
+    assert offered("bench trend K", tmp_path) == ["K_i"]
+    (tmp_path / "runs" / "index.sqlite").unlink()
+    (tmp_path / "runs" / "index.sqlite").mkdir()
+    assert offered("bench trend K", tmp_path) == []
 
 
 def test_every_procedure_and_command_is_known(tmp_path: Path) -> None:
     assert offered("bench run ''", tmp_path) == [entry.name for entry in catalogue.PROCEDURES]
     assert set(offered("bench ''", tmp_path)) >= {command.name for command in commands_of(app)}
+
+
+def test_every_schema_is_known() -> None:
+    assert list(completing.kinds()) == schemas.kinds()
 
 
 @pytest.mark.parametrize("shell", ["zsh", "fish"])

@@ -148,6 +148,18 @@ def test_the_page_says_nothing_of_the_run_without_the_token(shared: MadeRun, cli
     assert shared.url.index("#") < shared.url.index(client.token)
 
 
+def test_a_page_that_comes_while_a_simulation_stands_still_sees_where(made: MadeRun, own: Client) -> None:
+    """Its clock stands while somebody is asked: what was recorded before, with its age; not an empty page."""
+    made.hello()
+    made.block()
+    (came_ns, block) = made.tap._held["controller"].pop()
+    made.tap._held["controller"].append((came_ns - 60_000_000_000, block))
+    with made.questions.ask(Question("Hang M4.")), Page(own) as page:
+        sample = page.wait("samples")
+    assert sample["state"] == made.view.states[3]
+    assert sample["age_ms"] >= 60_000
+
+
 def test_a_page_that_comes_late_is_told_what_stands(made: MadeRun, own: Client) -> None:
     made.hub.tell("finding", {"id": "a", "text": "3 samples"}, "a")
     made.hub.tell("log", {"text": "first line"})

@@ -106,7 +106,10 @@ function showLink() {
   document.body.classList.toggle("stale", Boolean(stands));
   stop.link(!run.hello || run.link === "live");
   $("old").hidden = !stands;
-  $("old").textContent = ms === null ? "No data yet." : `No new data for ${ageText(ms)}: the plots stand still.`;
+  const waits = run.asked && run.hello?.backend === "sim" && run.link === "live"; // its clock goes on with the answer
+  $("old").textContent = ms === null ? "No data yet."
+    : waits ? `The simulation waits for the answer: the plots stand still, their data are ${ageText(ms)} old.`
+    : `No new data for ${ageText(ms)}: the plots stand still.`;
   if (newest.told) showSample(newest.told);
   if (!run.ended) showAge(ms, Boolean(stands));
   $("age").closest("div").hidden = Boolean(run.ended);
