@@ -145,7 +145,7 @@ def _said(s: Segment, t: Told, weight: float) -> Iterator[str]:
 
 
 def _disturbed(s: Segment, baseline: int) -> Iterator[str]:
-    """Runs of the baseline that are no sign of an undisturbed machine: beyond the limits that they helped to make, or in doubt."""
+    """Runs of the baseline that show no undisturbed machine: beyond the limits that they helped to make, or in doubt."""
     for k, (result, beyond) in enumerate(zip(s.results[:baseline], s.beyond, strict=False)):
         if beyond:
             yield f"run {k + 1} lies beyond them"
