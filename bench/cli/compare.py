@@ -25,7 +25,7 @@ from bench.record.records import Measurement, Record, read_record
 from bench.recording import Recording
 from bench.run.evaluation import yielded
 from bench.rundir import RunDirectory
-from bench.uncertainty import stated
+from bench.uncertainty import PROBABILITY, stated
 
 SCHEMA = 1
 SHOWN, PARTS = 12, 3
@@ -80,7 +80,7 @@ def _anew(path: Path) -> Found:
 def lines(found: Comparison, differ: Sequence[Differs], width: int, whole: bool = False) -> Iterator[str]:
     """The comparison as text of that width: the runs, what differs, the differences, and of those beyond 1 what could make
     them."""
-    yield f"{found.a.record.procedure}: B - A"
+    yield f"{found.a.record.procedure}: B - A, ± with 95 % coverage"
     for letter, side in (("A", found.a), ("B", found.b)):
         yield from _folded(f"  {letter}  ", _run(side), width)
     yield from _differ(differ, width, whole)
@@ -214,7 +214,7 @@ def as_data(found: Comparison, differ: Sequence[Differs]) -> dict[str, Any]:
     """The comparison as plain data, SI; docs/reference/compare.md describes it."""
     return {
         "schema": SCHEMA, "procedure": found.a.record.procedure, "a": _side(found.a), "b": _side(found.b),
-        "one_machine": found.one_machine, "differs": [vars(d) for d in differ],
+        "coverage_probability": PROBABILITY, "one_machine": found.one_machine, "differs": [vars(d) for d in differ],
         "differences": [_difference_as_data(d) for d in found.differences], "only": list(found.only),
         "cautions": list(found.cautions),
     }  # fmt: skip
