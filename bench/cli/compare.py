@@ -83,7 +83,7 @@ def lines(found: Comparison, differ: Sequence[Differs], width: int, whole: bool 
     yield f"{found.a.record.procedure}: B - A, ± with 95 % coverage"
     for letter, side in (("A", found.a), ("B", found.b)):
         yield from _folded(f"  {letter}  ", _run(side), width)
-    yield from _differ(differ, width, whole)
+    yield from _differ(found, differ, width, whole)
     if not found.one_machine:
         yield from _folded("  ", "two machines: they share what goes by one certificate, and nothing else", width)
     for caution in found.cautions:
@@ -119,10 +119,11 @@ def _run(side: Side) -> str:
     return f"{r.outcome.value:4} {r.started[:16].replace('T', ' ')}  {r.rig}{serial}{which}  {side.path.name}"
 
 
-def _differ(differ: Sequence[Differs], width: int, whole: bool) -> Iterator[str]:
+def _differ(found: Comparison, differ: Sequence[Differs], width: int, whole: bool) -> Iterator[str]:
     told = [d for d in differ if (d.what, d.key) not in (("rig", "seed"), ("rig", "visit"))]  # in the lines above
     if not told:
-        yield "  nothing else differs: plan, rig, parameters, firmware, certificates, versions"
+        said = found.a.record.setup is not None and found.b.record.setup is not None
+        yield f"  nothing else differs: plan, rig, {'parameters, firmware, certificates, ' if said else ''}versions"
     for d in told if whole else told[:SHOWN]:
         yield from _folded("  differs  ", f"{d.what}{f' {d.key}' if d.key else ''}: {d.a}, then {d.b}", width)
     if len(told) > SHOWN and not whole:

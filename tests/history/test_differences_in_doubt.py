@@ -11,8 +11,10 @@ import pytest
 from test_differences import GAIN, A, B, compared, difference, record, scatter, value
 
 from bench.calibration import Used
+from bench.cli.compare import lines
 from bench.findings import Effect, Finding
 from bench.history.compare import Side, compare
+from bench.history.differ import differing
 from bench.record.outcomes import Outcome
 from bench.record.records import ContinuedRun, findings_of
 from bench.uncertainty import Influence
@@ -35,6 +37,7 @@ def test_what_the_budgets_do_not_say_is_a_caution() -> None:
         ({"outcome": Outcome.ABORTED}, "B ended ABORTED: its values"),
         ({"findings": findings_of([overdue])}, "B rests on certificates that did not hold on its day: force"),
         ({"calibrations": (used,)}, "B rests on calibrations that had expired: unbalance"),
+        ({"setup": None}, "B: a record of before schema 3"),
         ({"measurements": other_unit}, "K_i: found N/mA in B; A has N/A"),
     ):
         (found,) = compared(a, dataclasses.replace(b, **change)).cautions  # type: ignore[arg-type]
@@ -72,3 +75,13 @@ def test_a_difference_without_a_standard_uncertainty_is_judged_by_its_interval()
         rectangle, t = drawn.uniform(-math.sqrt(3), math.sqrt(3), 400_000), drawn.standard_t(2, (2, 400_000))
         low, high = np.quantile(rectangle + 0.3 * t[0] + 0.2 * t[1], [0.025, 0.975])
         assert pytest.approx((high - low) / 2, rel=0.02) == found.U
+
+
+def test_what_an_old_record_does_not_say_is_not_said_to_be_the_same() -> None:
+    a, b = (record(run, value(1.0, {GAIN: 1.0})) for run in (A, B))
+    told = "\n".join(lines(compared(a, b), differing(a, b), 80))
+    assert "nothing else differs: plan, rig, parameters, firmware, certificates, versions" in told
+    old = dataclasses.replace(b, setup=None)
+    told = "\n".join(lines(compared(a, old), [], 80))
+    assert "nothing else differs: plan, rig, versions" in told
+    assert "caution: B: a record of before schema 3" in told
