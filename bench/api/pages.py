@@ -18,7 +18,7 @@ def of_record(record: Record) -> str:
     head = f"{record.procedure} on {record.rig}{which}: {record.outcome.value}"
     cells = [(r.name, r.value, r.verdict.value if r.limit else "", r.limit) for r in rows(record, record.measurements)]
     results = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in cells)
-    table = f"<table><tr><th>quantity</th><th>value</th><th>verdict</th><th>limit</th></tr>{results}</table>"
+    table = f"<table><tr><th>quantity</th><th>value, 95 %</th><th>verdict</th><th>limit</th></tr>{results}</table>"
     found = "".join(f"<li>{escape(f.code)}: {escape(f.text)}</li>" for f in record.findings)
     when = f"{record.run_id}, {record.started}"
     return f"<p><b>{escape(head)}</b><br>{escape(when)}</p>{table if results else ''}<ul>{found}</ul>"

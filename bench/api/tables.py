@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sqlite3
 from pathlib import Path
@@ -25,24 +26,27 @@ RESULTS = (
     "u",
     "k",
     "dof",
+    "p",
     "low",
     "high",
     "limit_low",
     "limit_high",
     "method",
 )
-NUMBERS = ("value", "U", "u", "k", "dof", "low", "high", "limit_low", "limit_high")
+NUMBERS = ("value", "U", "u", "k", "dof", "p", "low", "high", "limit_low", "limit_high")
 
 
 def results_of(record: Record) -> pd.DataFrame:
-    """A row for each quantity by its name: `value`, `U`, `unit`, `where`, `verdict`, `u`, `k`, `dof`, `low`, `high`,
-    `limit_low`, `limit_high`, `method`. Numbers that are not there are NaN."""
+    """A row for each quantity by its name: `value`, `U`, `unit`, `where`, `verdict`, `u`, `k`, `dof`, `p`, `low`, `high`,
+    `limit_low`, `limit_high`, `method`. [low, high] is the interval of coverage probability p and U half of its width, k u
+    where there is a u. Numbers that are not there are NaN; an infinite dof is inf."""
     import pandas as pd
 
     rows = [
         {
             "name": m.name, "value": m.value, "U": m.expanded_uncertainty, "unit": m.unit, "u": m.standard_uncertainty,
-            "k": m.coverage_factor, "dof": m.dof, "low": m.interval[0] if m.interval else None,
+            "k": m.coverage_factor, "dof": math.inf if m.dof is None and m.value is not None else m.dof,
+            "p": m.coverage_probability, "low": m.interval[0] if m.interval else None,
             "high": m.interval[1] if m.interval else None, "verdict": str(m.verdict),
             "limit_low": m.limit.low if m.limit else None, "limit_high": m.limit.high if m.limit else None,
             "method": m.method, "where": m.where,

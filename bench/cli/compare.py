@@ -25,7 +25,7 @@ from bench.record.records import Measurement, Record, read_record
 from bench.recording import Recording
 from bench.run.evaluation import yielded
 from bench.rundir import RunDirectory
-from bench.uncertainty import stated
+from bench.uncertainty import PROBABILITY, stated
 
 SCHEMA = 1
 SHOWN, PARTS = 12, 3
@@ -80,10 +80,10 @@ def _anew(path: Path) -> Found:
 def lines(found: Comparison, differ: Sequence[Differs], width: int, whole: bool = False) -> Iterator[str]:
     """The comparison as text of that width: the runs, what differs, the differences, and of those beyond 1 what could make
     them."""
-    yield f"{found.a.record.procedure}: B - A"
+    yield f"{found.a.record.procedure}: B - A, ± with 95 % coverage"
     for letter, side in (("A", found.a), ("B", found.b)):
         yield from _folded(f"  {letter}  ", _run(side), width)
-    yield from _differ(differ, width, whole)
+    yield from _differ(found, differ, width, whole)
     if not found.one_machine:
         yield from _folded("  ", "two machines: they share what goes by one certificate, and nothing else", width)
     for caution in found.cautions:
@@ -119,10 +119,11 @@ def _run(side: Side) -> str:
     return f"{r.outcome.value:4} {r.started[:16].replace('T', ' ')}  {r.rig}{serial}{which}  {side.path.name}"
 
 
-def _differ(differ: Sequence[Differs], width: int, whole: bool) -> Iterator[str]:
+def _differ(found: Comparison, differ: Sequence[Differs], width: int, whole: bool) -> Iterator[str]:
     told = [d for d in differ if (d.what, d.key) not in (("rig", "seed"), ("rig", "visit"))]  # in the lines above
     if not told:
-        yield "  all else is the same: plan, rig, parameters, firmware, certificates, versions"
+        said = found.a.record.setup is not None and found.b.record.setup is not None
+        yield f"  all else is the same: plan, rig, {'parameters, firmware, certificates, ' if said else ''}versions"
     for d in told if whole else told[:SHOWN]:
         yield from _folded("  differs  ", f"{d.what}{f' {d.key}' if d.key else ''}: {d.a}, then {d.b}", width)
     if len(told) > SHOWN and not whole:
@@ -214,7 +215,7 @@ def as_data(found: Comparison, differ: Sequence[Differs]) -> dict[str, Any]:
     """The comparison as plain data, SI; docs/reference/compare.md describes it."""
     return {
         "schema": SCHEMA, "procedure": found.a.record.procedure, "a": _side(found.a), "b": _side(found.b),
-        "one_machine": found.one_machine, "differs": [vars(d) for d in differ],
+        "coverage_probability": PROBABILITY, "one_machine": found.one_machine, "differs": [vars(d) for d in differ],
         "differences": [_difference_as_data(d) for d in found.differences], "only": list(found.only),
         "cautions": list(found.cautions),
     }  # fmt: skip

@@ -52,7 +52,7 @@ def _head(trend: Trend, t: Told, older: bool) -> tuple[str, str]:
     of = f"{trend.name} of {first.procedure} on {machine(first)}"
     span = f"{len(times)} runs, {t.when(times[0])} to {t.when(times[-1])}"
     left = [
-        "older ones are not shown (--last)" if older else "",
+        "older ones are neither shown nor in a baseline (--last)" if older else "",
         f"{trend.history.broken} without a value left out" if trend.history.broken else "",
         f"{trend.history.repeated} that are there twice left out" if trend.history.repeated else "",
     ]
@@ -132,6 +132,8 @@ def _said(s: Segment, t: Told, weight: float) -> Iterator[str]:
         limits = s.chart.limits
         yield (f"limits: {t.with_unit(limits.centre)} ± {t.with_unit(limits.half)}, three standard deviations by the moving "
                f"range of the first {s.chart.baseline} runs")  # fmt: skip
+        if inside := list(_disturbed(s, s.chart.baseline)):
+            yield f"in the baseline {', '.join(inside)}: the limits are as wide as that made them"
         if all(s.wide):
             yield ("U is wider than the limits in every run: what the runs have in common does not scatter, and the chart says "
                    "nothing of it")  # fmt: skip
@@ -140,6 +142,15 @@ def _said(s: Segment, t: Told, weight: float) -> Iterator[str]:
         if not s.signals and len(s.results) > s.chart.baseline:
             yield f"no signal in the {len(s.results) - s.chart.baseline} runs since"
     yield from _drift(s, t)
+
+
+def _disturbed(s: Segment, baseline: int) -> Iterator[str]:
+    """Runs of the baseline that show no undisturbed machine: beyond the limits that they helped to make, or in doubt."""
+    for k, (result, beyond) in enumerate(zip(s.results[:baseline], s.beyond, strict=False)):
+        if beyond:
+            yield f"run {k + 1} lies beyond them"
+        elif result.outcome == "INDETERMINATE":
+            yield f"run {k + 1} ended INDETERMINATE"
 
 
 def _signal(g: Signal, s: Segment, t: Told, weight: float) -> str:
@@ -151,9 +162,7 @@ def _signal(g: Signal, s: Segment, t: Told, weight: float) -> str:
     if watched > CHANCES:
         return shown + began
     left = no_signal(repeat(0.0, watched), 1.0 if g.chart == "individuals" else weight, baseline)[-1]
-    by_chance = (
-        f"Of machines that do not change {100 * (1 - left):.0f} % show one by now, with limits from {baseline} runs"
-    )
+    by_chance = f"Of machines that do not change {100 * (1 - left):.0f} % show one in this chart by now, with limits from {baseline} runs"
     return f"{shown}{began}. {by_chance}"
 
 

@@ -13,8 +13,8 @@ OUT_OF_DATE = ("certificate-overdue", "certificate-ahead")
 
 
 def cautions(a: Record, b: Record) -> Iterator[str]:
-    """A sentence each: one simulation or recording twice, units that differ, runs that could not be judged, certificates and
-    calibrations that did not hold on their day."""
+    """A sentence each: one simulation or recording twice, records that do not say with what, units that differ, runs that could
+    not be judged, certificates and calibrations that did not hold on their day."""
     yield from _together(a, b)
     for letter, record in (("A", a), ("B", b)):
         yield from _of_one(letter, record)
@@ -26,6 +26,9 @@ def _together(a: Record, b: Record) -> Iterator[str]:
                "nothing of how they repeat")  # fmt: skip
     if _recordings(a) & _recordings(b):
         yield "both rest on steps of one recording, which one of them goes on with: U takes their scatter for two"
+    if silent := [letter for letter, record in (("A", a), ("B", b)) if record.setup is None]:
+        yield (f"{' and '.join(silent)}: a record of before schema 3, which says no parameters, firmware and certificates; "
+               "what of these differs is not known, and what the rig file has is taken as it was")  # fmt: skip
     units = {(m.name, m.where): m.unit for m in a.measurements}
     for m in b.measurements:
         if (unit := units.get((m.name, m.where), m.unit)) != m.unit:

@@ -18,6 +18,7 @@ def as_data(trend: Trend) -> dict[str, Any]:
     return {
         "schema": SCHEMA, "quantity": trend.name, "unit": trend.unit, "procedure": first.procedure, "rig": first.rig,
         "uut": first.uut, "seed": first.seed, "machine": machine(first), "axis": trend.history.axis, "lambda": trend.weight,
+        "coverage_probability": first.p,
         "left_out": {"broken": trend.history.broken, "repeated": trend.history.repeated},
         "segments": [_segment(s, trend, step) for s, step in zip(trend.segments, [None, *steps(trend)], strict=True)],
     }  # fmt: skip

@@ -134,7 +134,8 @@ def results(ramps: Sequence[Ramp], rig: RigFile, plan: Plan) -> Result:
         for influence, slope in bends.items():
             e = e + Estimate(0.0, "", {influence: float(slope[j])})
         for own, width in most.items():
-            e = e + _count(own, width, float(_by_count(data, rig, plan, values, own, width)[j] - at[j]))
+            moves = float(_by_count(data, rig, plan, values, own, width)[j] - at[j])
+            e = e + _count(data.of[own], width, moves)
         out[name, where] = Estimate(e.value, unit, e.sensitivities)
     return Result(data, {a: float(at[j]) for j, a in enumerate(data.of)}, most, at[len(data.of) :], out)
 
@@ -143,12 +144,12 @@ def _scatter(identity: str, u: float, unit: str, dof: float) -> Estimate:
     return Estimate.of(0.0, Influence(f"scatter/{identity}", "scatter of the repeats", u, unit, "A", "normal", dof))
 
 
-def _count(axis: str, width: float, moves: float) -> Estimate:
-    """Where in its count an axis sticks is known to nobody: `moves` for half the width."""
+def _count(axis: StageAxis, width: float, moves: float) -> Estimate:
+    """Where in its count an axis sticks is known to nobody, N or N m: `moves` for half the width."""
     u = width / math.sqrt(12)
     if u == 0:
         return Estimate.exact(0.0)
-    known = Influence(f"counts/{axis}", f"where in a count {axis} sticks", u, "1", "B", "rectangular")
+    known = Influence(f"counts/{axis.name}", f"where in a count {axis.name} sticks", u, axis.force, "B", "rectangular")
     return Estimate(0.0, "", {known: moves / (width / 2)})
 
 

@@ -228,8 +228,9 @@ def _parted(
     for j, one in enumerate(known):
         if counts[j] or one.identity not in keep:
             continue
-        influence = Influence(one.identity, _called(one.identity), one.u, "1", "B", one.distribution)
-        out = [e + Estimate(0.0, "", {influence: float(s)}) for e, s in zip(out, gains[:, j], strict=True)]
+        stated = one.u * one.per
+        influence = Influence(one.identity, _called(one.identity), stated, one.unit, "B", one.distribution)
+        out = [e + Estimate(0.0, "", {influence: float(s) / one.per}) for e, s in zip(out, gains[:, j], strict=True)]
     freedom = float(max(len(of.x) * PHASES - len(MAP) - PHASES, 1))
     left = parts(found.scatter[np.ix_(rows, rows)], "scatter/loads", "scatter of the loads", "A", freedom)
     counted = parts(rounding, "counts/encoders", "counts of the encoder", "B", math.inf)

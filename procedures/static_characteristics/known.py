@@ -26,21 +26,26 @@ def _of_cells(at: Terms, rig: RigFile, both: tuple[Cell, Cell]) -> Iterator[Know
     along, around = both
     for name, cell, other, give in (("x", along, around, "give_x"), ("angle", around, along, "give")):
         stem, by, term = f"capabilities/load_cells/{cell.axis.name}", cell.by, at.cell
-        share = by.gain.standard_uncertainty / by.gain.value
-        yield Known(term(f"cell_{name}"), 1.0, max(share, EXACT), f"{stem}/gain", by.gain.distribution)
-        cross = by.cross.get(other.axis.name)
-        value, u = (
-            (0.0, 0.0) if cross is None else (cross.value / by.gain.value, cross.standard_uncertainty / by.gain.value)
-        )
-        yield Known(term(f"cross_{name}"), value, max(u, EXACT), f"{stem}/cross/{other.axis.name}",
-                    "rectangular" if cross is None else cross.distribution)  # fmt: skip
-        yield Known(
-            term(give), by.give.value, max(by.give.standard_uncertainty, 1e-12), f"{stem}/give", by.give.distribution
-        )
-    arm = rig.geometry[around.by.arm.removeprefix("geometry/")] if around.by.arm else None
-    u = EXACT if arm is None else max(arm.standard_uncertainty / arm.value, EXACT)
-    identity = around.by.arm or f"capabilities/load_cells/{around.axis.name}/arm"
-    yield Known(at.cell("arm"), 1.0, u, identity, "normal" if arm is None else arm.distribution)
+        yield _share(term(f"cell_{name}"), by.gain, f"{stem}/gain")
+        cross, identity = by.cross.get(other.axis.name), f"{stem}/cross/{other.axis.name}"
+        if cross is None:
+            yield Known(term(f"cross_{name}"), 0.0, EXACT, identity)
+        else:
+            yield _share(term(f"cross_{name}"), cross, identity, of=by.gain.value)
+        u = max(by.give.standard_uncertainty, 1e-12)
+        yield Known(term(give), by.give.value, u, f"{stem}/give", by.give.distribution, by.give.unit)
+    arm = around.by.arm
+    if arm:
+        yield _share(at.cell("arm"), rig.geometry[arm.removeprefix("geometry/")], arm)
+    else:
+        yield Known(at.cell("arm"), 1.0, EXACT, f"capabilities/load_cells/{around.axis.name}/arm", "normal")
+
+
+def _share(term: int, stated: Toleranced, identity: str, of: float | None = None) -> Known:
+    """A term that is a number over what it is stated as, or over `of`."""
+    per = stated.value if of is None else of
+    u = max(stated.standard_uncertainty / per, EXACT)
+    return Known(term, stated.value / per, u, identity, stated.distribution, stated.unit, per)
 
 
 def _of_currents(at: Terms, rig: RigFile, some: Sequence[Phase]) -> Iterator[Known]:
@@ -49,19 +54,21 @@ def _of_currents(at: Terms, rig: RigFile, some: Sequence[Phase]) -> Iterator[Kno
         for name, stated, part in (("current", sensor.gain, "gain"), ("offset", sensor.offset, "offset")):
             u = max(stated.standard_uncertainty, EXACT)
             identity = f"sensors/{phase.current}/{part}"
-            yield Known(at.each(name).start + k, stated.value, u, identity, stated.distribution)
+            yield Known(at.each(name).start + k, stated.value, u, identity, stated.distribution, stated.unit)
 
 
 def _of_encoders(at: Terms, both: tuple[Cell, Cell]) -> Iterator[Known]:
     x, angle = (cell.axis for cell in both)
     wide = EXACT if angle.error is None else _half(angle.error) / math.sqrt(2)  # of each part of a sine
     for k, part in enumerate(("cosine", "sine")):
-        yield Known(at.once.start + k, 0.0, max(wide, EXACT), f"encoders/{angle.name}/error/{part}", "arcsine")
+        yield Known(at.once.start + k, 0.0, max(wide, EXACT), f"encoders/{angle.name}/error/{part}", "arcsine", "rad")
     count = 0.0 if angle.pitch is None else angle.pitch.value
     for p in range(at.places):
         yield Known(at.off.start + p, 0.0, max(COUNT * count, EXACT), f"counts/{angle.name}/{p}")
-    share = 0.0 if x.pitch is None else x.pitch.standard_uncertainty / x.pitch.value
-    yield Known(at.scale, 1.0, max(share, EXACT), f"encoders/{x.name}/pitch")
+    if x.pitch is None:
+        yield Known(at.scale, 1.0, EXACT, f"encoders/{x.name}/pitch")
+    else:
+        yield _share(at.scale, x.pitch, f"encoders/{x.name}/pitch")
 
 
 def _half(number: Toleranced) -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import math
 import subprocess
 import sys
 from pathlib import Path
@@ -12,7 +14,11 @@ from recordings import START_NS, gapped, record
 
 import bench
 from bench.api.run import Run
+from bench.api.tables import results_of
 from bench.errors import ConfigError, RecordingError
+from bench.quantity import Quantity
+from bench.record.records import measurement, missing, unfinished
+from bench.uncertainty import Estimate, Influence
 
 NAME = "amb-calibration-20260101T000000Z-0000"
 
@@ -134,3 +140,22 @@ def test_importing_bench_loads_nothing_heavy() -> None:
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_results_say_what_their_uncertainties_are() -> None:
+    """An infinite dof is no missing one; with two the interval is stated and no u; U = k u by t of GUM table G.2."""
+    own = Influence("scatter/1", "scatter", 0.1, "N/A", "A", "normal", 8.0)
+    kinds = (dataclasses.replace(own, dof=math.inf), own, dataclasses.replace(own, dof=2.0))
+    made = [
+        measurement(Quantity(f"K_{k}", "N/A", "constant").measured(Estimate.of(75.0, i)), None)
+        for k, i in enumerate(kinds)
+    ]
+    blank = unfinished(run_id=NAME, procedure="step", rig="r", uut={}, started="", seed=None, plan={}, versions={})
+    gone = missing(Quantity("B", "N/A", "drag"))
+    found = results_of(dataclasses.replace(blank, measurements=(*made, gone)))
+    assert found.dof.tolist()[:3] == [math.inf, 8.0, 2.0]
+    assert found.k.tolist()[:2] == pytest.approx([1.96, 2.306], abs=1e-3)
+    assert found.U.tolist()[:3] == pytest.approx([0.196, 0.2306, 0.4303], abs=1e-4)
+    assert found.u.isna().tolist() == [False, False, True, True]
+    assert found.p.tolist()[:3] == [0.95] * 3
+    assert found.loc["B", ["value", "U", "dof", "p"]].isna().all()

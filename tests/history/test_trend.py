@@ -160,6 +160,16 @@ def test_visits_are_the_days_of_a_virtual_machine() -> None:
     assert again.history.times == found.history.times
 
 
+def test_a_baseline_that_was_disturbed_says_so() -> None:
+    values = [75.0, 75.02, 75.0, 75.02, 75.0, 75.3, 75.3, 75.32, 75.0, 75.02]
+    found = results(values)
+    found[2] = found[2]._replace(outcome="INDETERMINATE")
+    told = " ".join(text(of(found), False).split())
+    assert "in the baseline run 3 ended INDETERMINATE, run 6 lies beyond them" in told
+    assert "in the baseline" not in text(of(results(scattered(12))), False)
+    assert "neither shown nor in a baseline" in " ".join(text(of(results(scattered(12))), True).split())
+
+
 def test_a_copy_of_a_run_is_no_second_measurement() -> None:
     """Each run stands there twice: equal neighbours would take half of the moving range away."""
     once = results(scattered(12))
@@ -235,7 +245,7 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert len(started) == 10
     assert all(a < b for a, b in pairwise(started))
     assert main(["trend", "K_i", "--out", str(tmp_path), "--last", "10"]) == 0
-    assert "older ones are not shown (--last)" in capsys.readouterr().out
+    assert "older ones are neither shown" in capsys.readouterr().out
 
 
 def test_the_command_refuses(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -97,6 +97,17 @@ def test_what_a_count_delays() -> None:
     assert shares.mean() == pytest.approx(fit.MEAN * fit.beyond(inertia, count, per_s), rel=1e-3)
 
 
+def test_what_a_count_leaves_is_a_force_in_the_budget() -> None:
+    """By hand: of two ramps that are nearer by half of the width each, the breakaway is nearer by that; u = width/sqrt(12)."""
+    rising = [replace(r, rises={"x": 2.0, "angle": 0.02}) for r in made()]
+    _, r = told(rising)
+    for (name, where), unit in ((("breakaway", "x"), "N"), (("breakaway_angle", "angle"), "N m")):
+        e = r.estimates[name, where]
+        ((count, c),) = ((i, c) for i, c in e.sensitivities.items() if i.id == f"counts/{where}")
+        assert (count.unit, count.u) == (unit, pytest.approx(r.beyond[where] / 12**0.5))
+        assert abs(c) == pytest.approx(1.0, abs=0.05)
+
+
 def test_when_a_reading_changes() -> None:
     still = np.zeros(200)
     assert fit.broke_away(still, 1.0) is None

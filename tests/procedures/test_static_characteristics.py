@@ -18,6 +18,7 @@ from bench.cli.virtual import simulated_run
 from bench.findings import Effect, Finding
 from bench.procedure import Measured
 from bench.rigfile import load_rig
+from bench.rigfile.certificates import certified_numbers
 from bench.rigfile.check_load_cells import problems_of
 from bench.uncertainty import Estimate, interval
 from procedures.static_characteristics import checks, estimates, fit
@@ -81,6 +82,25 @@ def test_the_map_of_a_drawn_machine(sound: tuple[dict[str, Finding], Result]) ->
     assert result.estimates["static_slope", ""].u < 2.5e-3
     assert result.estimates["held_angle", ""].value == pytest.approx(0.01, rel=0.01)
     assert result.estimates["reciprocity", ""].value == pytest.approx(1, abs=4 * result.estimates["reciprocity", ""].u)
+
+
+def test_a_budget_has_certificates_as_the_rig_file_states_them(sound: tuple[dict[str, Finding], Result]) -> None:
+    """An arm of 100 mm with u 0.05 mm, not a share of 5e-4: the same number in every budget that it enters."""
+    stated = certified_numbers(RIG)
+    found = {i.id: i for e in sound[1].estimates.values() for i in e.sensitivities if i.id in stated}
+    assert {
+        "geometry/torque_arm",
+        "capabilities/load_cells/angle/give",
+        "sensors/i_a1/offset",
+        "encoders/x/pitch",
+    } <= set(found)
+    for name, i in found.items():
+        assert (i.u, i.unit) == (pytest.approx(stated[name].standard_uncertainty, rel=1e-12), stated[name].unit), name
+    torque = sound[1].estimates["torque", "A1"]
+    (by_arm,) = (c * i.u for i, c in torque.sensitivities.items() if i.id == "geometry/torque_arm")
+    assert (
+        abs(by_arm) < 5e-4 * torque.value
+    )  # of a torque by an arm that is off by 5e-4, less what the force's map tells
 
 
 def test_both_cells_tell_one_field(sound: tuple[dict[str, Finding], Result]) -> None:
