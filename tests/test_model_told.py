@@ -28,7 +28,7 @@ from procedures.stages import map_model
 
 RIG = load_rig("rlsrm")
 RUN = "inductance-map-20261129T025258Z-8044"
-DEFAULTS = {q: RIG.parameters[name].default for name, q in map_model.expected(RIG, "inductance-map").items()}
+DEFAULTS = {q: RIG.parameters[name].default for name, (_, q) in map_model.expected(RIG, "inductance-map").items()}
 
 
 def a_model(values: dict[str, float] = DEFAULTS, **changed: Any) -> Model:
@@ -66,7 +66,7 @@ def test_a_model_is_read_as_it_was_written_and_its_values_are_a_calibration(tmp_
     assert found == model
     made = told.calibration(found, "inductance-map", sha256)
     assert made is not None
-    assert map_model.adopted(RIG, made) == {
+    assert map_model.identified(RIG, "inductance-map", {"inductance-map": made}) == {
         name: RIG.parameters[name].default for name in map_model.expected(RIG, "inductance-map")
     }
     assert (made.run_id, made.seed, made.backend, made.uut, made.sealed) == (RUN, 1, "sim", "SIM-0019", False)
