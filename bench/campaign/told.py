@@ -7,6 +7,7 @@ controller and enter no budget (`Need.told`); for all else the runs themselves a
 from __future__ import annotations
 
 import hashlib
+from datetime import datetime
 from pathlib import Path
 
 from pydantic import ValidationError
@@ -33,10 +34,24 @@ def read(path: Path) -> tuple[Model, str]:
         raise ConfigError(f"{path}: cannot be read: {error}; expected the model.json of a campaign") from error
     require_schema(text, str(path), "model", SCHEMA)
     try:
-        return MODEL.validate_json(text), hashlib.sha256(data).hexdigest()
+        model = MODEL.validate_json(text)
     except ValidationError as error:
         listed = [f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors(include_url=False)]
         raise ConfigError("\n  ".join([f"{path}: not a model of schema {SCHEMA}:", *listed])) from error
+    for c in model.constants:
+        if not _dated(c) or min(c.standard_uncertainty or 0.0, c.expanded_uncertainty) < 0:
+            found = f"date {c.date!r}, u = {c.standard_uncertainty}, U = {c.expanded_uncertainty}"
+            raise ConfigError(
+                f"{path}: {c.name}: found {found}; expected a time with its zone, and no uncertainty below 0"
+            )
+    return model, hashlib.sha256(data).hexdigest()
+
+
+def _dated(c: Constant) -> bool:
+    try:
+        return datetime.fromisoformat(c.date).tzinfo is not None
+    except ValueError:
+        return False
 
 
 def refusals(model: Model, rig: RigFile, seed: int | None) -> list[str]:

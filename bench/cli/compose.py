@@ -111,8 +111,10 @@ def of_model(request: Request, rig: RigFile, seed: int | None, needs: Sequence[N
     if path is None:
         return {}
     if not told:
-        raise ConfigError(f"--model {path}: with this plan {request.procedure} tells the controller nothing of it. Next: a "
-                          "procedure and a plan that do, such as `bench run decoupling --plan 'model=\"inductance-map\"'`")  # fmt: skip
+        raise ConfigError(
+            f"--model {path}: with this plan {request.procedure} tells the controller nothing of it. Next: a procedure and a "
+            "plan that do, such as `bench run decoupling --plan 'model=\"inductance-map\"'`"
+        )
     model, sha256 = campaign_told.read(path)
     found = {name: campaign_told.calibration(model, name, sha256) for name in told}
     problems = campaign_told.refusals(model, rig, seed) or [

@@ -93,26 +93,25 @@ def nudge_of(axis: StageAxis, turns: float, plan: Plan) -> dict[str, float]:
 
 def needs(plan: Plan) -> tuple[Need, ...]:
     """An identified map, where the controller is to be given one."""
-    return (Need(plan.model, told=True),) if plan.model != OWN else ()
+    return () if plan.model == OWN else tuple(Need(name, told=True) for name in map_model.sources(plan.model))
 
 
 def foresees(rig: RigFile, plan: Plan, facts: Mapping[str, Calibration]) -> Iterable[str]:
     """A map that is not whole would leave the controller with a part of its own; one beyond its ranges is none of this kind."""
     if plan.model == OWN:
         return
-    found = facts[plan.model]
-    wanted, given = map_model.expected(rig, plan.model), map_model.adopted(rig, found)
-    if missing := [quantity for name, quantity in wanted.items() if name not in given]:
-        yield f"model: the map of {found.run_id} holds no {', '.join(missing)}; expected all that the controller has"
+    wanted, given = map_model.expected(rig, plan.model), map_model.identified(rig, plan.model, facts)
+    for source in map_model.sources(plan.model):
+        if missing := [q for name, (procedure, q) in wanted.items() if procedure == source and name not in given]:
+            yield f"model: {facts[source].run_id} holds no {', '.join(missing)}; expected all that the controller has"
     yield from (f"model: {problem}" for problem in Envelope(rig).problems_of(given))
 
 
 def _give_map(rig: Rig, plan: Plan, record: Recorder) -> None:
     """An identified map to the controller, which takes one at rest alone; at each start it has its own again."""
     assert rig.motion is not None
-    found = next(c for c in record.calibrations if c.procedure == plan.model)
     transition(rig, RigState.READY)
-    rig.motion.write(map_model.adopted(rig.file, found))
+    rig.motion.write(map_model.identified(rig.file, plan.model, {c.procedure: c for c in record.calibrations}))
     transition(rig, RigState.HELD)
 
 

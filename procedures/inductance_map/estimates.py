@@ -14,6 +14,7 @@ from bench.uncertainty import Estimate, Influence
 from procedures.inductance_map import fit
 from procedures.inductance_map.fit import Found, Known
 from procedures.inductance_map.model import MAP, PHASES, Rows, Terms
+from procedures.inductance_map.pulses import Array
 from procedures.inductance_map.steps import Taken, rows
 from procedures.shared.certificates import certified_gain
 from procedures.shared.joint import parts
@@ -21,7 +22,8 @@ from procedures.stages.map_model import present
 from procedures.stages.stators import Phase, axis, phases
 
 UNITS = {"slope": "H/m", "length": "m", "overlap": "m", "fringe": "m", "zero": "rad", "centre": "m", "give": "rad/(N m)",
-         "give_x": "m/N", "leakage": "H", "saturation": "A", "resistance": "Ohm"}  # fmt: skip
+         "give_x": "m/N", "leakage": "H", "saturation": "A", "resistance": "Ohm",
+         "current_zero": "A"}  # fmt: skip
 COUNT = 1 / math.sqrt(12)  # standard uncertainty of a reading within its count
 FIRST = {"slope": 0.8, "unaligned": 0.15, "c2": 0.03, "c3": 0.09, "length": 0.028, "overlap": 0.014, "fringe": 1.5e-3}
 """Where the fit begins if the controller has no map."""
@@ -105,6 +107,9 @@ def estimates(found: Found, known: Sequence[Known], of: Rows, rig: RigFile, some
     out["saturation", ""] = _in(sum(saturation, Estimate.exact(0.0)) / PHASES, "saturation")
     for k, phase in enumerate(some):
         out["resistance", phase.name] = _resistance(phase, factor[k], taken)
+    if all(t.zeros for t in taken):
+        for k, phase in enumerate(some):
+            out["current_zero", phase.name] = _current_zero(phase, np.array([t.zeros[k] for t in taken]))
     return out
 
 
@@ -120,6 +125,15 @@ def _resistance(phase: Phase, factor: Estimate, taken: Sequence[Taken]) -> Estim
         f"scatter/resistance/{phase.name}", "scatter of the pulses", u, "Ohm", "A", "normal", len(each) - 1.0
     )
     return _in(Estimate.exact(float(each.mean())) * factor, "resistance") + Estimate.of(0.0, scatter)
+
+
+def _current_zero(phase: Phase, each: Array) -> Estimate:
+    """What a current reads where there is none, in the mean over the places (n,)."""
+    u = float(each.std(ddof=1)) / math.sqrt(len(each))
+    scatter = Influence(
+        f"scatter/current_zero/{phase.name}", "scatter of the places", u, "A", "A", "normal", len(each) - 1.0
+    )
+    return _in(Estimate.of(float(each.mean()), scatter), "current_zero")
 
 
 def _terms(found: Found, known: Sequence[Known], of: Rows) -> list[Estimate]:

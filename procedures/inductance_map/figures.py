@@ -12,7 +12,7 @@ from bench.rigfile import RigFile
 from procedures.inductance_map.estimates import Result
 from procedures.inductance_map.model import MAP, angular, flux
 from procedures.inductance_map.residuals import left
-from procedures.stages.map_model import names
+from procedures.stages.map_model import currents, names
 
 
 def all_figures(r: Result, rig: RigFile) -> Iterator[Shown]:
@@ -69,7 +69,8 @@ def _fluxes(r: Result) -> Figure:
 
 def _parameters(r: Result, rig: RigFile) -> Sheet:
     stators = list(dict.fromkeys(p.motor for p in r.phases))
-    told, rows = names(stators, [p.name for p in r.phases]), []
+    each = [p.name for p in r.phases]
+    told, rows = {**names(stators, each), **currents(each)}, []
     for meaning, quantity in told.items():
         name = rig.capabilities.model.get(meaning, "")
         estimate = r.estimates.get(tuple(quantity.partition("@")[::2]))  # type: ignore[arg-type]

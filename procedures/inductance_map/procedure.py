@@ -52,6 +52,7 @@ MEASURES = (
     Quantity("give", "rad/(N m)", "by which the lock turns"),
     Quantity("give_x", "m/N", "by which the lock gives way along", title="give along"),
     Quantity("resistance", "Ohm", "of a phase as it was meanwhile"),
+    Quantity("current_zero", "A", "what a phase's current reads where there is none", title="zero of a current"),
 )  # fmt: skip
 
 
@@ -159,7 +160,8 @@ def requires(rig: RigFile) -> Requires:
     unread = [p.name for p in some if not p.voltage]
     return Requires(
         roles=("motion", "operator"),
-        channels=(STATE, *(a.channel for a in (axis(rig, "stroke"), axis(rig, "angle")) if a is not None)),
+        channels=(STATE, *(a.channel for a in (axis(rig, "stroke"), axis(rig, "angle")) if a is not None),
+                  *(p.current for p in some)),
         sensors=tuple(c for p in some for c in (p.current, p.voltage) if c),
         machine=(POLES,),
         capabilities=wanted,

@@ -33,7 +33,7 @@ class Shot:
 @dataclass(frozen=True)
 class Taken:
     """A place: what the encoders read there, what was captured of each phase, and what the pulses show (None: nothing);
-    `states` of the controller before the pulses."""
+    `states` of the controller before the pulses, and what currents of the phases (6,) A read then, without one."""
 
     place: Place
     x: float
@@ -41,6 +41,7 @@ class Taken:
     shots: Mapping[str, Shot]
     pulses: Mapping[str, Pulse | None]
     states: tuple[str, ...]
+    zeros: tuple[float, ...] = ()
 
 
 def captured(rig: RigFile, phase: Phase) -> tuple[str, ...]:
@@ -62,14 +63,16 @@ def read_taken(recording: Recording[Plan]) -> list[Taken]:
 def _taken(recording: Recording[Plan], step: Step, place: Place) -> Taken:
     rig, names = recording.rig, recording.rig.choices(STATE)
     x, angle = _encoders(rig)
-    data = step.read(x, angle, STATE)
+    currents = [p.current for p in phases(rig)]
+    data = step.read(x, angle, STATE, *currents)
     states = tuple(names.get(int(code), str(int(code))) for code in np.unique(data[STATE]))
     shots = {}
     for phase in phases(rig):
         found = recording.captures(place=place.number, phase=phase.name)
         if found and found[0].samples > 1:
             shots[phase.name] = _shot(found[0].arrays(*captured(rig, phase)), rig, phase)
-    return Taken(place, float(data[x].mean()), float(data[angle].mean()), shots, {}, states)
+    return Taken(place, float(data[x].mean()), float(data[angle].mean()), shots, {}, states,
+                 tuple(float(data[c].mean()) for c in currents))  # fmt: skip
 
 
 def _shot(data: Mapping[str, Array], rig: RigFile, phase: Phase) -> Shot:

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from reluctance import SHORT, pulse, taken
 
+from bench.calibration import Calibration
 from bench.cli.motion_truth import truth_of_motion
 from bench.cli.virtual import simulated_run
 from bench.findings import Effect, Finding
@@ -25,7 +26,7 @@ from procedures.inductance_map.places import grid
 from procedures.inductance_map.plan import Plan
 from procedures.inductance_map.procedure import check, procedure
 from procedures.inductance_map.steps import Taken, with_pulses
-from procedures.stages.map_model import parameters
+from procedures.stages.map_model import FLUX, identified
 from procedures.stages.stators import phases
 from sim_backend.machines.rlsrm.params import DEG, PHASES, ControlParams, Map, PlantParams
 from sim_backend.machines.rlsrm.plant import TICKS_S, Plant
@@ -228,8 +229,8 @@ def test_a_controller_that_is_given_the_map(sound: list[Taken]) -> None:
     p = drawn(3)
     _, result = told(sound)
     assert result is not None
-    values = {f"{name}@{where}" if where else name: e.value for (name, where), e in result.estimates.items()}
-    given = parameters(RIG, values, ["stator1", "stator2"], list(PHASES))
+    values = {f"{name}@{where}" if where else name: e for (name, where), e in result.estimates.items()}
+    given = identified(RIG, FLUX, {FLUX: Calibration(FLUX, values)})
     assert len(given) == 18
 
     def cross(known: Map) -> float:
@@ -257,7 +258,7 @@ def test_the_whole_path(tmp_path: Path) -> None:
             if key in true:
                 i = interval(r.estimate)
                 off[key] = (r.estimate.value - true[key]) / (0.5 * (i.high - i.low))
-    assert len(off) == 22
+    assert len(off) == 28
     assert sum(abs(v) > 1 for v in off.values()) <= 3, off
     assert max(map(abs, off.values())) < 2, off
     shown = list(procedure.figures(procedure.evaluated(done.recording).result, done.recording))

@@ -30,10 +30,12 @@ OF_ALL: Final = {
     "current_limit": "current_max", "open_phase": "test_phase", "open_current": "test_current", "safe_holds": "safe_holds",
 }  # fmt: skip
 OF_MAP: Final = ("slope", "unaligned", "c2", "c3", "length", "overlap", "fringe", "leakage", "saturation", "centre")
+CURRENT_ZERO: Final = "current_zero_"
 SETTABLE: Final = frozenset((
     *OF_ALL, "pulse_s", *(f"{axis}_target" for axis in AXES),
     *(f"{name}_{axis}" for name in OF_AXES for axis in AXES),
     *(f"{axis}_{name}" for name in OF_SET_POINTS for axis in AXES),
+    *(f"{CURRENT_ZERO}{k}" for k in range(1, 7)),
     *(f"map_{name}" for name in OF_MAP), "map_zero_1", "map_zero_2", *(f"map_gain_{k}" for k in range(1, 7)),
 ))  # fmt: skip
 """What can be set, by the rig file's names."""
@@ -129,6 +131,8 @@ class StagePlant:
             raise KeyError(name)
         if name == "pulse_s":
             self.core.pulse(self._chosen, value)
+        elif name.startswith(CURRENT_ZERO):
+            self.core.zero(int(name.removeprefix(CURRENT_ZERO)) - 1, value)
         elif name.startswith("map_"):
             self.core.know(name.removeprefix("map_"), value)
         elif name.endswith("_target"):
@@ -182,7 +186,11 @@ def control_of(settings: Mapping[str, float]) -> ControlParams:
     no part of it."""
     control: Any = ControlParams()
     for name, value in settings.items():
-        if name.startswith("map_"):
+        if name.startswith(CURRENT_ZERO):
+            zeros = list(control.current_zero)
+            zeros[int(name.removeprefix(CURRENT_ZERO)) - 1] = value
+            control = replace(control, current_zero=tuple(zeros))
+        elif name.startswith("map_"):
             control = replace(control, map=_mapped(control.map, name.removeprefix("map_"), value))
         elif name in OF_ALL:
             control = replace(control, **{OF_ALL[name]: value})

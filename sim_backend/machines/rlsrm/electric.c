@@ -16,7 +16,7 @@ void rlsrm_amplifiers(const rlsrm_params *p, const rlsrm_control *c, rlsrm_state
             st->summed[k] = u[winding] = 0;
             continue;
         }
-        double read = p->current_gain[k] * i + (wanted > 0 ? p->current_offset[k] : 0), off = wanted - read;
+        double read = p->current_gain[k] * i + (wanted > 0 ? p->current_offset[k] - c->current_zero[k] : 0), off = wanted - read;
         double most_V = p->supply * p->share[k], ask = c->resistance * wanted + c->kp_i * off + st->summed[k];
         u[winding] = clip(ask, -most_V, most_V);
         if (u[winding] == ask)

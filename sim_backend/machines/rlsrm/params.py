@@ -135,4 +135,5 @@ class ControlParams:
     trip_warm: float = 120.0  # degrees C
     test_phase: float = 7.0  # in READY this phase alone carries `test_current`; beyond 5: none
     test_current: float = 0.0  # A
+    current_zero: Each = (0.0,) * 6  # A that its loops take off what the amplifiers' sensors read
     watchdog_s: float = 0.08

@@ -64,6 +64,10 @@ class Plant:
         else:
             getattr(self._c, name)[AXES.index(axis)] = value
 
+    def zero(self, amplifier: int, amperes: float) -> None:
+        """What the loop of an amplifier takes off what its sensor reads."""
+        self._c.current_zero[amplifier] = amperes
+
     def switch(self, *, on: bool | None = None, x: bool | None = None, angle: bool | None = None) -> None:
         """Switch the amplifiers and the position loops while it is OFF; a loop begins without integral and slope."""
         if on is not None:

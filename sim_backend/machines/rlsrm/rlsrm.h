@@ -48,6 +48,7 @@ typedef struct {
     double home_current[2], home_s[2], home_rate, safe_holds; /* A, s of a step; m/s; 1: held after MAKE_SAFE */
     double trip_A, trip_m, trip_rate[2], trip_warm, watchdog_s; /* m of stroke; m/s, rad/s; degrees C */
     double test_phase, test_current;                           /* READY: this phase alone carries so much; beyond 5: none */
+    double current_zero[6];                                    /* A: what its sensors read without a current */
 } rlsrm_control;
 
 typedef struct {

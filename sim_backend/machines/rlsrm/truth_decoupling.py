@@ -126,7 +126,8 @@ def scale(p: PlantParams, c: ControlParams, asked: DecouplingAsked) -> float:
 def given(p: PlantParams, c: ControlParams, at: tuple[float, float], asked: tuple[float, float]) -> tuple[float, float]:
     """True force and torque of a demand at rest."""
     wanted, *_ = distribute(c, *at, *asked)
-    told = np.where(wanted > 0, np.maximum(wanted - np.array(p.current_offset), 0.0) / np.array(p.current_gain), 0.0)
+    off = np.array(p.current_offset) - np.array(c.current_zero)
+    told = np.where(wanted > 0, np.maximum(wanted - off, 0.0) / np.array(p.current_gain), 0.0)
     true = np.zeros(6)
     true[[int(k) for k in p.wired]] = told
     q = p.map.saturation**2 * (np.sqrt(1 + (true / p.map.saturation) ** 2) - 1)

@@ -35,6 +35,7 @@ def of_map(rig: RigFile, drawn: Any) -> Told:
         ("uneven", "sine"): m.uneven * float(np.sin(m.uneven_phase)),
         ("give", ""): drawn.values["lock_give_angle"], ("give_x", ""): drawn.values["lock_give_x"],
     }  # fmt: skip
+    out |= {("current_zero", name): zero for name, zero in zip(PHASES, p.current_offset, strict=True)}
     out |= {("gain", name): g / mean for name, g in zip(PHASES, m.gain, strict=True)}
     return out | {("zero", motor): m.zero[k] for k, motor in enumerate(motors)}
 
