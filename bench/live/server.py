@@ -125,7 +125,7 @@ def _resolved(address: str, port: int, options: str) -> tuple[socket.AddressFami
 def _why(error: OSError, address: str, port: int, options: str) -> str:
     if error.errno == errno.EADDRINUSE:
         return (f"{options}port {port}: found it in use on {address}; expected a free port; nothing was started. Next: end "
-                "what uses it, give another, or leave {options}port out for any free one")  # fmt: skip
+                f"what uses it, give another, or leave {options}port out for any free one")  # fmt: skip
     if error.errno == errno.EADDRNOTAVAIL:
         return (f"{options}bind {address}: found no such address on this host; expected one of its own, such as 127.0.0.1 or "
                 "0.0.0.0; nothing was started")  # fmt: skip
