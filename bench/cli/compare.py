@@ -16,6 +16,7 @@ from bench.cli.loading import load_procedure
 from bench.cli.told import unit_text
 from bench.display_units import of_result
 from bench.errors import AnalysisError, BenchError
+from bench.findings import SIMULATED_CONTROLLER
 from bench.history.compare import Comparison, Difference, Found, Part, Side, compare
 from bench.history.differ import Differs, differing
 from bench.history.naming import pair_named
@@ -24,6 +25,7 @@ from bench.quantity import Measured
 from bench.record.records import Measurement, Record, read_record
 from bench.recording import Recording
 from bench.run.evaluation import yielded
+from bench.run.indexrow import MachineKind, machine_kind
 from bench.rundir import RunDirectory
 from bench.uncertainty import PROBABILITY, stated
 
@@ -85,7 +87,10 @@ def lines(found: Comparison, differ: Sequence[Differs], width: int, whole: bool 
         yield from _folded(f"  {letter}  ", _run(side), width)
     yield from _differ(found, differ, width, whole)
     if not found.one_machine:
-        yield from _folded("  ", "two machines: they share what goes by one certificate, and nothing else", width)
+        a, b = _machine(found.a.record), _machine(found.b.record)
+        which = "two machines: they share what goes by one certificate, and nothing else"
+        twin = f"a {a} machine and a {b} one: nothing that is certified is the same in both"
+        yield from _folded("  ", which if a == b else twin, width)
     for caution in found.cautions:
         yield from _folded("  caution: ", caution, width)
     ordered = sorted(found.differences, key=lambda d: -_size(d))
@@ -114,9 +119,14 @@ def _size(d: Difference) -> float:
 
 def _run(side: Side) -> str:
     r = side.record
-    which = "" if r.seed is None else f", seed {r.seed}, visit {r.visit}"
+    kind = _machine(r)
+    which = {"real": "", "served": ", served simulation"}.get(kind, f", seed {r.seed}, visit {r.visit}")
     serial = f" {r.uut['serial']}" if r.uut.get("serial") else ""
     return f"{r.outcome.value:4} {r.started[:16].replace('T', ' ')}  {r.rig}{serial}{which}  {side.path.name}"
+
+
+def _machine(r: Record) -> MachineKind:
+    return machine_kind(r.seed, any(f.code == SIMULATED_CONTROLLER for f in r.findings))
 
 
 def _differ(found: Comparison, differ: Sequence[Differs], width: int, whole: bool) -> Iterator[str]:
@@ -225,7 +235,7 @@ def _side(side: Side) -> dict[str, Any]:
     r: Record = side.record
     return {
         "run_id": r.run_id, "path": str(side.path), "rig": r.rig, "uut": dict(r.uut), "outcome": r.outcome.value,
-        "started": r.started, "seed": r.seed, "visit": r.visit,
+        "started": r.started, "seed": r.seed, "visit": r.visit, "machine": _machine(r),
     }  # fmt: skip
 
 

@@ -43,6 +43,14 @@ class Keep(StrEnum):
     NONE = "none"
 
 
+class Machine(StrEnum):
+    """On what a run was made."""
+
+    REAL = "real"
+    SERVED = "served"
+    SIMULATED = "simulated"
+
+
 Out = Annotated[Path, typer.Option("--out", help="Folder of the run directories.")]
 Calibrations = Annotated[
     Path | None,

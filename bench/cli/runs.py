@@ -6,24 +6,28 @@ import difflib
 import json
 import sqlite3
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from json.encoder import encode_basestring
 from pathlib import Path
 from typing import Any
 
 from bench.errors import BenchError, ConfigError
 from bench.progress_text import columns
 from bench.run import index
-from bench.run.indexrow import IndexEntry, Result
+from bench.run.indexrow import Kind, MachineKind, Numbers, Result
 
-Shown = dict[str, dict[str, Result]]
+Shown = dict[str, dict[str, Result | Numbers]]
 """Results by name and run."""
+Listed = list[tuple[Any, ...]]
+"""Of each run its name, the number of its kind and, for JSON, when it began and ended."""
 FEW = 1000  # runs whose results are looked for one by one
 
 
 @dataclass(frozen=True)
 class RunsRequest:
-    """What is to be listed: of which procedure and rig, those that did not pass, the newest so many, with which results."""
+    """What is to be listed: of which procedure, rig and machine, those that did not pass, the newest
+    so many, with which results."""
 
     out: Path
     procedure: str | None = None
@@ -32,6 +36,7 @@ class RunsRequest:
     last: int | None = None
     show: tuple[str, ...] = field(default=())
     as_json: bool = False
+    machine: MachineKind | None = None
 
 
 def runs_command(request: RunsRequest) -> int:
@@ -61,38 +66,40 @@ def _none_such(request: RunsRequest) -> str:
         if asked is not None and known and asked not in known:
             near = difflib.get_close_matches(asked, known, 1)
             told.append(f" of {asked}; there are some of {', '.join(near or sorted(known)[:8])}")
-    filtered = any((request.procedure, request.rig, request.failed))
+    filtered = any((request.procedure, request.rig, request.failed, request.machine))
     return ";".join(told) or (" that are as asked for" if filtered else "")
 
 
-def _told(request: RunsRequest) -> list[IndexEntry]:
-    """The runs that are asked for, printed."""
+def _told(request: RunsRequest) -> int:
+    """How many runs are as asked for, which are printed."""
     out = request.out
     try:
-        found = index.entries(
-            out, procedure=request.procedure, rig=request.rig, failed=request.failed, last=request.last
-        )
+        found, kinds = index.listing(
+            out, procedure=request.procedure, rig=request.rig, failed=request.failed, last=request.last,
+            machine=request.machine, timed=request.as_json,
+        )  # fmt: skip
         shown = _shown(request, found)
     except (sqlite3.Error, OSError) as error:
         raise BenchError(f"{out / index.NAME}: the index cannot be used: {error}") from error
     if request.as_json:
-        json.dump([_as_data(e, out, shown) for e in found], sys.stdout, indent=2, ensure_ascii=False)
-        sys.stdout.write("\n")
+        sys.stdout.write(_as_json(found, kinds, out, shown))
     else:
-        sys.stdout.writelines(_lines(found, out, shown, columns() if sys.stdout.isatty() else None))
-    return found
+        width = columns() if sys.stdout.isatty() else None
+        sys.stdout.write("".join(_lines(found, kinds, out, shown, width)))
+    return len(found)
 
 
-def _shown(request: RunsRequest, found: Sequence[IndexEntry]) -> Shown:
+def _shown(request: RunsRequest, found: Listed) -> Shown:
     """The results that are to be shown. One word may mean several names: a kind, all that is measured of it.
 
     Raises:
         ConfigError: no run has measured it.
     """
     out: Shown = {}
-    few = [e.run_id for e in found] if len(found) <= FEW else None
+    few = [run[0] for run in found] if len(found) <= FEW else None
     for word in request.show:
-        results = index.results(request.out, quantity=word, of=few)
+        results: Sequence[Result | Numbers]
+        results = index.numbers(request.out, word) if few is None else index.results(request.out, quantity=word, of=few)
         if not results and not index.results(request.out, quantity=word, last=1):
             known = index.names(request.out)
             near = difflib.get_close_matches(word, known, 3) or known[:8]
@@ -105,44 +112,44 @@ def _shown(request: RunsRequest, found: Sequence[IndexEntry]) -> Shown:
     return out
 
 
-def _lines(found: Sequence[IndexEntry], out: Path, shown: Shown, width: int | None) -> Iterator[str]:
+def _lines(found: Listed, kinds: Mapping[int, Kind], out: Path, shown: Shown, width: int | None) -> Iterator[str]:
     """A line each: outcome, what is shown of it, rig, which virtual one, the run directory. On a terminal that is too narrow
     the directory goes by its name, then which rig it was is left out, and at last what is shown gets a line of its own.
 
     Very many runs are of few kinds: what is the same in all runs of one is put together once."""
-    kinds = [(e.outcome, e.rig, e.served, e.seed, e.visit) for e in found]
-    ends = {kind: [kind[1], which_machine(*kind[2:])] for kind in set(kinds)}
-    values = [{run: _value(r) for run, r in by_run.items()} for by_run in shown.values()]
-    outcomes = max((len(kind[0]) for kind in ends), default=0)
+    of = {n: kinds[n] for n in {run[1] for run in found}}
+    ends = {n: [kind.rig, which_machine(kind.served, kind.seed, kind.visit)] for n, kind in of.items()}
+    here = {run[0] for run in found} if shown else set()
+    values = [{run: _value(r) for run, r in by_run.items() if run in here} for by_run in shown.values()]
+    outcomes = max((len(kind.outcome) for kind in of.values()), default=0)
     sizes = [max(len(name), *map(len, column.values()), 1) for name, column in zip(shown, values, strict=True)]
     tails = [max((len(end[k]) for end in ends.values()), default=0) for k in (0, 1)]
-    paths = [f"{out}/{e.run_id}" for e in found]
-    longest = max(map(len, paths), default=0)
+    longest = max((len(run[0]) for run in found), default=0)
+    folder = f"{out}/"
 
     def wide() -> int:
-        return 1 + outcomes + sum(sizes) + sum(tails) + len(sizes) + len(tails) + longest
+        return 1 + outcomes + sum(sizes) + sum(tails) + len(sizes) + len(tails) + len(folder) + longest
 
     if width is not None and wide() > width:
-        paths = [e.run_id for e in found]
-        longest = max(map(len, paths), default=0)
+        folder = ""
         while tails and wide() > width:
             tails.pop()
     below = width is not None and bool(shown) and wide() > width
-    start = {kind: kind[0].ljust(outcomes) for kind in ends}
-    end = {kind: "".join(f"{text:{n}} " for text, n in zip(texts, tails, strict=False)) for kind, texts in ends.items()}
-    if not shown:
-        whole = {kind: f"{start[kind]} {end[kind]}" for kind in ends}
-        yield from [f"{whole[kind]}{path}\n" for kind, path in zip(kinds, paths, strict=True)]
-        return
-    if below:
-        for kind, path, e in zip(kinds, paths, found, strict=True):
-            yield f"{start[kind]} {end[kind]}{path}\n"
-            yield from (f"  {name} {v[e.run_id]}\n" for name, v in zip(shown, values, strict=True) if e.run_id in v)
+    start = {n: kind.outcome.ljust(outcomes) for n, kind in of.items()}
+    end = {
+        n: "".join(f"{text:{k}} " for text, k in zip(texts, tails, strict=False)) + folder for n, texts in ends.items()
+    }
+    if not shown or below:
+        whole = {n: f"{start[n]} {end[n]}" for n in of}
+        for run in found:
+            yield f"{whole[run[1]]}{run[0]}\n"
+            if below:
+                yield from (f"  {name} {v[run[0]]}\n" for name, v in zip(shown, values, strict=True) if run[0] in v)
         return
     yield " ".join([" " * outcomes, *(name.ljust(n) for name, n in zip(shown, sizes, strict=True))]).rstrip() + "\n"
-    for kind, path, e in zip(kinds, paths, found, strict=True):
-        cells = " ".join(v.get(e.run_id, "-").ljust(n) for v, n in zip(values, sizes, strict=True))
-        yield f"{start[kind]} {cells} {end[kind]}{path}\n"
+    for run in found:
+        cells = " ".join(v.get(run[0], "-").ljust(n) for v, n in zip(values, sizes, strict=True))
+        yield f"{start[run[1]]} {cells} {end[run[1]]}{run[0]}\n"
 
 
 def which_machine(served: bool, seed: int | None, visit: int | None) -> str:
@@ -152,18 +159,36 @@ def which_machine(served: bool, seed: int | None, visit: int | None) -> str:
     return "" if seed is None else f"seed {seed}, visit {visit}" if visit else f"seed {seed}"
 
 
-def _value(r: Result) -> str:
+def _value(r: Result | Numbers) -> str:
     from bench.cli.told import with_unit
 
     return "missing" if r.value is None or r.U is None else with_unit(r.value, r.U, r.unit)
 
 
-def _as_data(e: IndexEntry, out: Path, shown: Shown) -> dict[str, Any]:
-    results = {name: _result_as_data(by_run[e.run_id]) for name, by_run in shown.items() if e.run_id in by_run}
-    return {**e._asdict(), "served": bool(e.served), "path": str(out / e.run_id), "results": results}
+def _as_json(found: Listed, kinds: Mapping[int, Kind], out: Path, shown: Shown) -> str:
+    """A line for each run. Of very many what is the same in all of a kind is encoded once."""
+    own = {n: _encoded(_kind_as_data(kind))[1:-1] for n, kind in kinds.items()}
+    folder = encode_basestring(f"{out}/")[:-1]
+    lines = []
+    for run_id, kind, started, ended in found:
+        name, end = encode_basestring(run_id), "null" if ended is None else encode_basestring(ended)
+        results = (
+            {n: _result_as_data(by_run[run_id]) for n, by_run in shown.items() if run_id in by_run} if shown else {}
+        )
+        lines.append(f'{{"run_id": {name}, {own[kind]}, "started": {encode_basestring(started)}, "ended": {end}, '
+                     f'"path": {folder}{name[1:]}, "results": {_encoded(results) if results else "{}"}}}')  # fmt: skip
+    return "[\n" + ",\n".join(lines) + "\n]\n"
 
 
-def _result_as_data(r: Result) -> dict[str, Any]:
+def _encoded(data: Mapping[str, Any]) -> str:
+    return json.dumps(data, ensure_ascii=False)
+
+
+def _kind_as_data(kind: Kind) -> dict[str, Any]:
+    return {**kind._asdict(), "served": bool(kind.served), "machine": kind.machine}
+
+
+def _result_as_data(r: Result | Numbers) -> dict[str, Any]:
     return {
         "value": r.value, "unit": r.unit, "standard_uncertainty": r.u, "expanded_uncertainty": r.U, "dof": r.dof,
         "coverage_probability": r.p, "low": r.lower, "high": r.upper, "verdict": r.verdict,

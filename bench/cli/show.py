@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast, get_args
 
 from bench.cli.live import EVERYWHERE, LOOK_S, PageRequest, announced, result_of
 from bench.cli.runs import which_machine
@@ -19,7 +19,7 @@ from bench.live.gate import Refused
 from bench.os_signals import delivered_to
 from bench.record.records import read_record
 from bench.run import index
-from bench.run.indexrow import IndexEntry
+from bench.run.indexrow import IndexEntry, MachineKind
 from bench.rundir import RunDirectory
 
 SCHEMA, SHOWN = 1, 100  # runs of a list where nothing is said of their number
@@ -120,7 +120,7 @@ class StoredRuns:
         request = self._trend(asked)
         with self._one:
             found, older = found_trend(request)
-            return {**as_data(found), "told": list(parts(found, older))}
+            return {**as_data(found), "older": older, "told": list(parts(found, older))}
 
     def figure(self, asked: Query) -> str:
         """A quantity's trend as SVG."""
@@ -133,7 +133,7 @@ class StoredRuns:
             raise Refused(400, "quantity: found none; expected a name of results, such as K_i")
         seed = _whole(asked, "seed", 0) if asked.get("seed") else None
         return TrendRequest(asked["quantity"], self._folder, asked.get("rig"), asked.get("procedure"), seed,
-                            _whole(asked, "last", TrendRequest.last, least=2))  # fmt: skip
+                            _whole(asked, "last", TrendRequest.last, least=2), machine=_machine(asked))  # fmt: skip
 
     def _known(self, run_id: str) -> tuple[IndexEntry, RunDirectory]:
         """A run of the folder. What was asked for is compared with what is there, and becomes no path by itself.
@@ -158,13 +158,31 @@ def _report(run: RunDirectory) -> Path:
 
 
 def _run(e: IndexEntry) -> dict[str, Any]:
-    return {**e._asdict(), "served": bool(e.served), "which": which_machine(e.served, e.seed, e.visit)}
+    return {
+        **e._asdict(),
+        "served": bool(e.served),
+        "machine": e.machine,
+        "which": which_machine(e.served, e.seed, e.visit),
+    }
 
 
 def _meant(e: IndexEntry, words: list[str]) -> bool:
     """Whether all words are in what a line says of the run; `failed` is any that ended neither PASS nor DONE."""
-    said = " ".join((e.run_id, e.procedure, e.rig, e.uut, e.outcome, which_machine(e.served, e.seed, e.visit))).lower()
+    which = which_machine(e.served, e.seed, e.visit)
+    said = " ".join((e.run_id, e.procedure, e.rig, e.uut, e.outcome, e.machine, which)).lower()
     return all(e.outcome not in index.SOUND if word == "failed" else word in said for word in words)
+
+
+def _machine(asked: Query) -> MachineKind | None:
+    """What machine a query is for.
+
+    Raises:
+        Refused: 400, there is no such.
+    """
+    word = asked.get("machine")
+    if word is not None and word not in get_args(MachineKind):
+        raise Refused(400, f"machine: found {word[:40]}; expected {', '.join(get_args(MachineKind))}")
+    return cast("MachineKind | None", word)
 
 
 def _whole(asked: Query, name: str, default: int, least: int = 0) -> int:

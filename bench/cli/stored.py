@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from bench.cli.options import Calibrations, Out, ProcedureFile, RunArgument, Table, Verbose
+from bench.cli.options import Calibrations, Machine, Out, ProcedureFile, RunArgument, Table, Verbose
 
 
 def adopt(
@@ -70,11 +70,14 @@ def runs(
         list[str] | None, typer.Option("--show", metavar="QUANTITY", help="With this result, such as K_i; repeatable.")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="As JSON.")] = False,
+    machine: Annotated[Machine | None, typer.Option("--machine", help="Those of such a machine alone.")] = None,
 ) -> int:
     """List the runs with their outcomes, oldest first."""
     from bench.cli.runs import RunsRequest, runs_command
 
-    return runs_command(RunsRequest(out, procedure, rig, failed, last, tuple(show or ()), as_json))
+    return runs_command(
+        RunsRequest(out, procedure, rig, failed, last, tuple(show or ()), as_json, machine and machine.value)
+    )
 
 
 def show(
@@ -121,6 +124,10 @@ def trend(
         str | None, typer.Option("--procedure", metavar="PROCEDURE", help="Only runs of this procedure.")
     ] = None,
     seed: Annotated[int | None, typer.Option("--seed", min=0, help="Only runs of this virtual machine.")] = None,
+    machine: Annotated[
+        Machine | None,
+        typer.Option("--machine", help="Only runs of such a machine; default real, where there are any."),
+    ] = None,
     out: Out = Path("runs"),
     last: Annotated[int, typer.Option("--last", metavar="N", min=2, help="The newest N runs.")] = 100,
     weight: Annotated[float, typer.Option("--lambda", help="Weight of the newest value in the EWMA.")] = 0.2,
@@ -134,7 +141,7 @@ def trend(
     from bench.cli.trend import TrendRequest, trend_command
 
     asked = TrendRequest(quantity=quantity, out=out, rig=rig, procedure=procedure, seed=seed, last=last, weight=weight,
-                         baseline=baseline, json=json, figure=figure)  # fmt: skip
+                         baseline=baseline, json=json, figure=figure, machine=machine and machine.value)  # fmt: skip
     return trend_command(asked)
 
 

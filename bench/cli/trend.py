@@ -12,6 +12,7 @@ from bench.errors import BenchError, ConfigError
 from bench.history.series import one_history
 from bench.history.trend import Trend, trend
 from bench.run import index
+from bench.run.indexrow import MachineKind
 from bench.wholefile import write_whole
 
 
@@ -29,6 +30,7 @@ class TrendRequest:
     baseline: int = 8
     json: bool = False
     figure: Path | None = None
+    machine: MachineKind | None = None
 
 
 def trend_command(asked: TrendRequest) -> int:
@@ -62,21 +64,34 @@ def found_trend(asked: TrendRequest) -> tuple[Trend, bool]:
         raise ConfigError(
             f"--out {asked.out}: found no folder there; expected one of run directories. Next: name it with --out"
         )
+    if asked.seed is not None and asked.machine not in (None, "simulated"):
+        raise ConfigError(f"--seed {asked.seed}: found --machine {asked.machine} beside it, which has no seed; expected one of "
+                          f"them. Next: leave --machine out")  # fmt: skip
     try:
+        machine, twins = _followed(asked)
         # Of a virtual machine all runs are read: the index does not choose by seed.
         most = asked.last + 1 if asked.seed is None else None
         results = index.results(
-            asked.out, quantity=asked.quantity, procedure=asked.procedure, rig=asked.rig, last=most
+            asked.out, quantity=asked.quantity, procedure=asked.procedure, rig=asked.rig, last=most, machine=machine
         )  # fmt: skip
         if asked.seed is not None:
             results = [r for r in results if r.seed == asked.seed]
         runs = list(dict.fromkeys(r.run_id for r in results))
         kept = set(runs[-asked.last :])
         history = one_history([r for r in results if r.run_id in kept], asked.quantity, lambda: index.names(asked.out),
-                              str(asked.out))  # fmt: skip
+                              str(asked.out), twins)  # fmt: skip
     except (sqlite3.Error, OSError) as error:
         raise BenchError(f"{asked.out / index.NAME}: the index cannot be used: {error}") from error
     return trend(history, weight=asked.weight, baseline=asked.baseline), len(runs) > asked.last
+
+
+def _followed(asked: TrendRequest) -> tuple[MachineKind | None, int]:
+    """What machine is followed, and how many runs of others are left out by that: unless something else is asked for a real
+    one, where there are runs of it, and never its twin beside it."""
+    if asked.machine is not None or asked.seed is not None:
+        return asked.machine or "simulated", 0
+    found = index.machines(asked.out, asked.quantity, asked.procedure, asked.rig)
+    return ("real", found.total() - found["real"]) if found["real"] else (None, 0)
 
 
 def drawn(found: Trend) -> str:

@@ -55,6 +55,8 @@ def _head(trend: Trend, t: Told, older: bool) -> tuple[str, str]:
         "older ones are neither shown nor in a baseline (--last)" if older else "",
         f"{trend.history.broken} without a value left out" if trend.history.broken else "",
         f"{trend.history.repeated} that are there twice left out" if trend.history.repeated else "",
+        f"{trend.history.twins} of simulations left out (--machine)" if trend.history.twins else "",
+        "served simulations of any seed count as one machine" if first.machine == "served" else "",
     ]
     return of, "; ".join(x for x in (span, *left) if x)
 

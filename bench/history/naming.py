@@ -85,8 +85,10 @@ def _last(back: int, word: str, root: Path, of: Sequence[RunDirectory]) -> RunDi
 
 
 def _series(found: Sequence[IndexEntry], of: Sequence[RunDirectory]) -> list[IndexEntry]:
-    """The runs that `last` counts: of one procedure on one rig, those of the newest run that it can mean."""
+    """The runs that `last` counts: of one procedure on one rig, those of the newest run that it can mean; not those of a real
+    machine beside those of its twin."""
     names = {run.run_id for run in of}
     procedures = {name.rsplit("-", 2)[0] for name in names}
     rest = [e for e in found if (not procedures or e.procedure in procedures) and e.run_id not in names]
-    return [e for e in rest if (e.procedure, e.rig) == (rest[-1].procedure, rest[-1].rig)]
+    newest = rest[-1:]
+    return [e for e in rest for n in newest if (e.procedure, e.rig, e.machine) == (n.procedure, n.rig, n.machine)]

@@ -22,21 +22,25 @@ BROKEN = ("ERROR", "ABORTED")  # outcomes of which values are not taken
 class History:
     """Values of one quantity, oldest first. `times` are days since 1970 UTC, or the visits of a virtual machine, of which each
     is another day. `broken` runs ended in an error and are left out, `repeated` ones are the same simulation or the same run
-    once more."""
+    once more, `twins` are of a simulation of the machine, served or not."""
 
     results: tuple[Result, ...]
     times: tuple[float, ...]
     axis: Literal["date", "visit"]
     broken: int
     repeated: int
+    twins: int = 0
 
 
-def one_history(found: Sequence[Result], quantity: str, known: Callable[[], Sequence[str]], place: str) -> History:
+def one_history(
+    found: Sequence[Result], quantity: str, known: Callable[[], Sequence[str]], place: str, twins: int = 0
+) -> History:
     """The history that `found`, the results of the index for `quantity`, are.
 
     Args:
         known: the names that the index has, for the message where nothing was found.
         place: where was looked, in words.
+        twins: how many runs of simulations were left out, as there are some of a real machine.
 
     Raises:
         ConfigError: there is no such quantity, or it is several, or in several units, or of one run.
@@ -51,24 +55,40 @@ def one_history(found: Sequence[Result], quantity: str, known: Callable[[], Sequ
             f"trend of {quantity}: found different units: {listed}; expected one. Next: add --procedure NAME"
         )
     _require_one("procedure", (r.procedure for r in found), f"trend of {quantity}", "Next: add --procedure {}")
-    _require_one(
-        "machine", map(machine, found), f"trend of {quantity}", "Next: add --rig NAME, or --seed N of a virtual one"
-    )
+    _require_one("machine", map(machine, found), f"trend of {quantity}", f"Next: {_apart(found)}")
     whole = [r for r in found if r.value is not None and r.outcome not in BROKEN]
     once = _each_once(whole)
     if len(once) < 2:
         raise ConfigError(f"trend of {quantity}: found {_counted(len(once), 'run')} with a value in {place}; expected 2 or "
-                          "more. Next: run the procedure again, or `bench runs` to see what is there")  # fmt: skip
+                          f"more. Next: run the procedure again, or {_seen(twins)}")  # fmt: skip
     by_visit = once[0].seed is not None and len({r.visit for r in once}) == len(once)
     timed = sorted((float(r.visit or 0) if by_visit else days(r.started), k) for k, r in enumerate(once))
     return History(tuple(once[k] for _, k in timed), tuple(t for t, _ in timed), "visit" if by_visit else "date",
-                   len(found) - len(whole), len(whole) - len(once))  # fmt: skip
+                   len(found) - len(whole), len(whole) - len(once), twins)  # fmt: skip
 
 
 def machine(r: Result) -> str:
     """Which machine a result is of, in words."""
     which = f"seed {r.seed}" if r.seed is not None else "served simulation" if r.served else r.uut
     return f"{r.rig} ({which})" if which else r.rig
+
+
+def _apart(found: Sequence[Result]) -> str:
+    """How one of several machines is chosen."""
+    if len({r.machine for r in found}) > 1:
+        return f"add --machine {' or '.join(sorted({r.machine for r in found}))}"
+    if len({r.rig for r in found}) > 1:
+        return "add --rig NAME"
+    if len({r.seed for r in found}) > 1:
+        return "add --seed N"
+    return "keep the runs of each in a folder of its own, and name it with --out"
+
+
+def _seen(twins: int) -> str:
+    """What else may be followed, where a real machine has too few runs."""
+    if not twins:
+        return "`bench runs` to see what is there"
+    return f"follow its twin, which has {_counted(twins, 'run')}, by --machine served or simulated"
 
 
 def days(started: str) -> float:
@@ -102,7 +122,7 @@ def _nothing(quantity: str, known: Sequence[str], place: str) -> str:
             f"trend of {quantity}: found no results in {place}; expected a folder of runs. Next: name it with --out DIR"
         )
     if quantity in known:
-        options = "--rig, --procedure or --seed"
+        options = "--rig, --procedure, --machine or --seed"
         return f"trend of {quantity}: found no such result in {place} by {options}; expected some. Next: leave them out"
     folded = {name.casefold(): name for name in reversed(known)}
     near = [folded[n] for n in difflib.get_close_matches(quantity.casefold(), folded, LISTED, cutoff=0.5)]

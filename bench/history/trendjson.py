@@ -14,12 +14,12 @@ SCHEMA = 1
 
 def as_data(trend: Trend) -> dict[str, Any]:
     """The trend without NaN; what is not known is None."""
-    first = trend.history.results[0]
+    first, history = trend.history.results[0], trend.history
     return {
         "schema": SCHEMA, "quantity": trend.name, "unit": trend.unit, "procedure": first.procedure, "rig": first.rig,
-        "uut": first.uut, "seed": first.seed, "machine": machine(first), "axis": trend.history.axis, "lambda": trend.weight,
-        "coverage_probability": first.p,
-        "left_out": {"broken": trend.history.broken, "repeated": trend.history.repeated},
+        "uut": first.uut, "seed": first.seed, "machine": machine(first), "machine_kind": first.machine, "axis": history.axis,
+        "lambda": trend.weight, "coverage_probability": first.p,
+        "left_out": {"broken": history.broken, "repeated": history.repeated, "twins": history.twins},
         "segments": [_segment(s, trend, step) for s, step in zip(trend.segments, [None, *steps(trend)], strict=True)],
     }  # fmt: skip
 

@@ -9,6 +9,7 @@ import logging
 import os
 import sqlite3
 import time
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from itertools import groupby
@@ -17,33 +18,33 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from bench.errors import ConfigError
-from bench.run.indexrow import IndexEntry, MadeWith, Result, Row
+from bench.run.indexrow import (
+    CALLED,
+    KIND,
+    MADE,
+    RUN_COLUMNS,
+    TABLES,
+    IndexEntry,
+    Kind,
+    MachineKind,
+    Numbers,
+    Result,
+    Row,
+)
 from bench.rundir import RunDirectory, named_as_run, runs_in
 
 NAME = "index.sqlite"
-VERSION = 5  # of the tables; another one is rebuilt
+VERSION = 6  # of the tables; another one is rebuilt
 SOUND = ("PASS", "DONE")
 TICK_NS = 1_000_000_000  # two changes of a folder that are nearer may have one time
-LISTED_NS = (
-    10_000_000_000  # an index that knows all of its folder is made so much older than that: nothing else makes it so
-)
+LISTED_NS = 10_000_000_000  # so much older an index is made that knows all of its folder: nothing else makes it so
 T = TypeVar("T")
 log = logging.getLogger(__name__)
-
-
-RUN_COLUMNS = ", ".join(IndexEntry._fields)
-MADE = ", ".join(MadeWith._fields)
-CALLED = "name, full, quantity, place, unit"
-TABLES = f"""
-    CREATE TABLE runs (run INTEGER PRIMARY KEY, {RUN_COLUMNS}, made INTEGER, UNIQUE (run_id));
-    CREATE TABLE made_with (made INTEGER PRIMARY KEY, {MADE}, UNIQUE ({MADE}));
-    CREATE INDEX runs_by_time ON runs (started, run_id);
-    CREATE TABLE names (number INTEGER PRIMARY KEY, {CALLED}, UNIQUE ({CALLED}));
-    CREATE TABLE results (number INTEGER, run INTEGER, ordinal INTEGER, value, u, expanded, dof, p, lower, upper, verdict,
-                          certificates, PRIMARY KEY (number, run, ordinal)) WITHOUT ROWID;
-    CREATE INDEX results_by_run ON results (run);
-"""
-"""Results lie together by name, and refer to runs by number: so a series of very many is read in a fraction of a second."""
+OF_MACHINE: dict[MachineKind, str] = {
+    "real": "seed IS NULL AND NOT served",
+    "served": "seed IS NULL AND served",
+    "simulated": "seed IS NOT NULL",
+}
 _READ = """r.run_id, procedure, rig, uut, started, seed, visit, outcome, name, quantity, place, unit, value, u, expanded, dof,
     p, lower, upper, verdict, settings, firmware, calibrations, parameters, certificates, served"""
 
@@ -72,22 +73,48 @@ def rebuild(root: Path) -> list[str]:
 
 
 def entries(
-    root: Path, *, procedure: str | None = None, rig: str | None = None, failed: bool = False, last: int | None = None
-) -> list[IndexEntry]:
+    root: Path, *, procedure: str | None = None, rig: str | None = None, failed: bool = False, last: int | None = None,
+    machine: MachineKind | None = None,
+) -> list[IndexEntry]:  # fmt: skip
     """The runs in `root`, oldest first, without those deleted since; rebuilds a missing or corrupt index.
 
     `failed` are those that ended neither PASS nor DONE; `last` the newest so many of what is left by the others."""
     if not root.is_dir():
         return []
-    where, values = _chosen(procedure, rig, failed)
-    query = f"SELECT {RUN_COLUMNS} FROM runs r {where} ORDER BY started {{0}}, r.run_id {{0}}"
+    where, values = _chosen(procedure, rig, failed, machine)
+    query = f"SELECT {RUN_COLUMNS} FROM runs r JOIN kinds USING (kind) {where} ORDER BY started {{0}}, r.run_id {{0}}"
     with uncollected():
         return [IndexEntry._make(row) for row in _read(root, lambda db: _there(db, root, query, values, last))]
 
 
+def listing(
+    root: Path, *, procedure: str | None = None, rig: str | None = None, failed: bool = False, last: int | None = None,
+    machine: MachineKind | None = None, timed: bool = False,
+) -> tuple[list[tuple[Any, ...]], dict[int, Kind]]:  # fmt: skip
+    """What `entries` gives, quicker of very many runs: of each its name and the number of its kind, `timed` with its beginning
+    and end; and all kinds by their numbers."""
+    if not root.is_dir():
+        return [], {}
+    where, values = _chosen(procedure, rig, failed, machine)
+    wanted = f"WHERE kind IN (SELECT kind FROM kinds {where})" if where else ""
+    times = ", started, ended" if timed else ""
+    query = f"SELECT run_id, kind{times} FROM runs {wanted} ORDER BY started {{0}}, run_id {{0}}"
+
+    def asked(db: sqlite3.Connection) -> tuple[list[tuple[Any, ...]], dict[int, Kind]]:
+        return _there(db, root, query, values, last), _kinds(db)
+
+    with uncollected():
+        return _read(root, asked)
+
+
+def _kinds(db: sqlite3.Connection, where: str = "", values: tuple[str, ...] = ()) -> dict[int, Kind]:
+    found = db.execute(f"SELECT kind, {KIND} FROM kinds {where}", values)
+    return {number: Kind._make(kind) for number, *kind in found}
+
+
 def results(
     root: Path, *, quantity: str | None = None, procedure: str | None = None, rig: str | None = None, failed: bool = False,
-    last: int | None = None, of: Sequence[str] | None = None,
+    last: int | None = None, of: Sequence[str] | None = None, machine: MachineKind | None = None,
 ) -> list[Result]:  # fmt: skip
     """Results of the runs in `root`, oldest run first, in the record's order within a run; those deleted since left out.
 
@@ -99,19 +126,48 @@ def results(
     """
     if not root.is_dir():
         return []
-    where, values = _chosen(procedure, rig, failed, of)
+    where, values = _chosen(procedure, rig, failed, machine, of)
     # The newest few are found by going back through the runs, all of a series where they lie together.
     tables = "runs r CROSS JOIN results s ON s.run = r.run" if last or of else "results s JOIN runs r USING (run)"
-    tables += " JOIN names n ON n.number = s.number JOIN made_with USING (made)"
+    tables += " JOIN kinds USING (kind) JOIN names n ON n.number = s.number JOIN made_with USING (made)"
 
     def asked(db: sqlite3.Connection) -> list[tuple[Any, ...]]:
-        named = "" if quantity is None else f" AND s.number IN ({', '.join(map(str, _meant(db, quantity)))})"
+        named = "" if quantity is None else f" AND {_named(db, quantity)}"
         query = (f"SELECT {_READ} FROM {tables} {where or 'WHERE 1'}{named} "
                  "ORDER BY started {0}, r.run_id {0}, ordinal {0}")  # fmt: skip
         return _there(db, root, query, values, last if of is None else len(of))
 
     with uncollected():
         return [Result._make((*row, root)) for row in _read(root, asked)]
+
+
+def numbers(root: Path, quantity: str) -> list[Numbers]:
+    """What all runs have measured of a quantity, as `results` has it, in no order; of runs deleted since too."""
+
+    def asked(db: sqlite3.Connection) -> list[Numbers]:
+        called = {number: rest for number, *rest in db.execute("SELECT number, name, unit FROM names")}
+        query = f"""SELECT run_id, s.number, value, u, expanded, dof, p, lower, upper, verdict
+            FROM results s JOIN runs USING (run) WHERE {_named(db, quantity)}"""
+        return [Numbers(run, *called[number], *rest) for run, number, *rest in db.execute(query)]
+
+    with uncollected():
+        return _answered(root, asked) if root.is_dir() else []
+
+
+def machines(root: Path, quantity: str, procedure: str | None = None, rig: str | None = None) -> Counter[MachineKind]:
+    """How many runs measured a quantity, by the machines that they were made on; nothing where all runs are of one sort."""
+    found: Counter[MachineKind] = Counter()
+
+    def asked(db: sqlite3.Connection) -> Counter[MachineKind]:
+        of = {number: kind.machine for number, kind in _kinds(db, *_chosen(procedure, rig, False, None)).items()}
+        if len(set(of.values())) > 1:
+            query = f"""SELECT kind, count(DISTINCT run) FROM results s JOIN runs USING (run)
+                WHERE {_named(db, quantity)} GROUP BY kind"""
+            for kind, runs in db.execute(query):
+                found.update({of[kind]: runs} if kind in of else {})
+        return found
+
+    return _answered(root, asked) if root.is_dir() else found
 
 
 def names(root: Path) -> list[str]:
@@ -131,14 +187,20 @@ def _meant(db: sqlite3.Connection, asked: str) -> list[int]:
     return []
 
 
+def _named(db: sqlite3.Connection, quantity: str) -> str:
+    """The condition that a result is of a quantity."""
+    return f"s.number IN ({', '.join(map(str, _meant(db, quantity)))})"
+
+
 def _chosen(
-    procedure: str | None, rig: str | None, failed: bool, of: Sequence[str] | None = None
+    procedure: str | None, rig: str | None, failed: bool, machine: MachineKind | None, of: Sequence[str] | None = None
 ) -> tuple[str, tuple[str, ...]]:
     """The condition of a query for runs, with its values."""
     asked = {"procedure = ?": procedure, "rig = ?": rig}
     conditions = [text for text, value in asked.items() if value is not None]
     values = tuple(v for v in asked.values() if v is not None)
     conditions += [f"outcome NOT IN {SOUND}"] if failed else []
+    conditions += [OF_MACHINE[machine]] if machine is not None else []
     if of is not None:
         conditions.append("r.run_id IN (SELECT value FROM json_each(?))")
         values = (*values, json.dumps(list(of)))
@@ -244,7 +306,7 @@ def _filled(root: Path) -> list[str]:
     messages: list[str] = []
     with _opened(root) as db:
         db.execute("BEGIN IMMEDIATE")  # before the records are read: another process adds before or after, not between
-        for table in ("runs", "made_with", "names", "results"):
+        for table in ("runs", "kinds", "made_with", "names", "results"):
             db.execute(f"DROP TABLE IF EXISTS {table}")
         for statement in filter(str.strip, TABLES.split(";")):
             db.execute(statement)
@@ -261,18 +323,21 @@ def _put(db: sqlite3.Connection, row: Row) -> None:
     for (run,) in db.execute("SELECT run FROM runs WHERE run_id = ?", row.entry[:1]).fetchall():
         db.execute("DELETE FROM results WHERE run = ?", (run,))
         db.execute("DELETE FROM runs WHERE run = ?", (run,))
-    of_run = (None, *row.entry, _kept(db, "made_with", "made", MADE, row.made_with))
+    e = row.entry
+    kept = (_kept(db, "kinds", "kind", KIND, e.kind), _kept(db, "made_with", "made", MADE, row.made_with))
+    of_run = (None, e.run_id, e.started, e.ended, *kept)
     run = db.execute(f"INSERT INTO runs VALUES ({', '.join('?' * len(of_run))})", of_run).lastrowid
     for ordinal, (called, numbers) in enumerate(row.results):
         number = _kept(db, "names", "number", CALLED, called)
         db.execute("INSERT INTO results VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", (number, run, ordinal, *numbers))
 
 
-def _kept(db: sqlite3.Connection, table: str, key: str, columns: str, texts: tuple[str, ...]) -> int:
+def _kept(db: sqlite3.Connection, table: str, key: str, columns: str, shared: tuple[str | int | None, ...]) -> int:
     """The number of what many rows share, which a table has once."""
-    places = ", ".join("?" * len(texts))
-    known = db.execute(f"SELECT {key} FROM {table} WHERE ({columns}) = ({places})", texts).fetchone()
-    return int(known[0] if known else db.execute(f"INSERT INTO {table} VALUES (NULL, {places})", texts).lastrowid or 0)
+    alike = " AND ".join(f"{column} IS ?" for column in columns.split(", "))
+    known = db.execute(f"SELECT {key} FROM {table} WHERE {alike}", shared).fetchone()
+    places = ", ".join("?" * len(shared))
+    return int(known[0] if known else db.execute(f"INSERT INTO {table} VALUES (NULL, {places})", shared).lastrowid or 0)
 
 
 @contextmanager

@@ -1,13 +1,39 @@
-"""Rows of the index of runs: tuples with names, as they are read by the hundred thousand."""
+"""Rows of the index of runs, tuples with names, as they are read by the hundred thousand; and its tables."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import NamedTuple
+from typing import Literal, NamedTuple
+
+MachineKind = Literal["real", "served", "simulated"]
+"""What was measured: a machine, its twin that is served in real time, or a virtual one of a seed."""
+
+
+def machine_kind(seed: int | None, served: bool) -> MachineKind:
+    """By what a record says of its run."""
+    return "simulated" if seed is not None else "served" if served else "real"
+
+
+class Kind(NamedTuple):
+    """What many runs have in common, as the index keeps it once. `served`: live, on a controller that says that it is a
+    simulated one; `uut` is the machine's serial number, else its model."""
+
+    procedure: str
+    rig: str
+    outcome: str
+    seed: int | None
+    visit: int | None
+    served: bool
+    uut: str
+
+    @property
+    def machine(self) -> MachineKind:
+        """Real, served or simulated."""
+        return machine_kind(self.seed, self.served)
 
 
 class IndexEntry(NamedTuple):
-    """One run, as `bench runs` lists it; `uut` is the machine's serial number, else its model."""
+    """One run, as `bench runs` lists it, with what it has of its `Kind`."""
 
     run_id: str
     procedure: str
@@ -17,8 +43,18 @@ class IndexEntry(NamedTuple):
     ended: str | None
     seed: int | None
     visit: int | None
-    served: bool  # live, on a controller that says that it is a simulated one
+    served: bool
     uut: str
+
+    @property
+    def machine(self) -> MachineKind:
+        """Real, served or simulated."""
+        return machine_kind(self.seed, self.served)
+
+    @property
+    def kind(self) -> Kind:
+        """What other runs may have in common with it."""
+        return Kind(self.procedure, self.rig, self.outcome, self.seed, self.visit, self.served, self.uut)
 
 
 class MadeWith(NamedTuple):
@@ -37,6 +73,22 @@ class Row(NamedTuple):
     entry: IndexEntry
     made_with: MadeWith
     results: list[tuple[tuple[str, ...], tuple[float | str | None, ...]]]
+
+
+class Numbers(NamedTuple):
+    """A result's numbers and its name, without what it was made with: as `Result` has them."""
+
+    run_id: str
+    name: str
+    unit: str
+    value: float | None
+    u: float | None
+    U: float | None
+    dof: float | None
+    p: float
+    lower: float | None
+    upper: float | None
+    verdict: str
 
 
 class Result(NamedTuple):
@@ -78,6 +130,11 @@ class Result(NamedTuple):
     root: Path
 
     @property
+    def machine(self) -> MachineKind:
+        """Real, served or simulated."""
+        return machine_kind(self.seed, self.served)
+
+    @property
     def path(self) -> Path:
         """The run directory."""
         return self.root / self.run_id
@@ -102,3 +159,21 @@ class Result(NamedTuple):
             if not getattr(self, name)
         }
         return self._replace(**silent) if silent else self
+
+
+RUN_COLUMNS = ", ".join(IndexEntry._fields)
+KIND = ", ".join(Kind._fields)
+MADE = ", ".join(MadeWith._fields)
+CALLED = "name, full, quantity, place, unit"
+TABLES = f"""
+    CREATE TABLE runs (run INTEGER PRIMARY KEY, run_id, started, ended, kind INTEGER, made INTEGER, UNIQUE (run_id));
+    CREATE TABLE kinds (kind INTEGER PRIMARY KEY, {KIND}, UNIQUE ({KIND}));
+    CREATE TABLE made_with (made INTEGER PRIMARY KEY, {MADE}, UNIQUE ({MADE}));
+    CREATE INDEX runs_by_time ON runs (started, run_id, kind);
+    CREATE TABLE names (number INTEGER PRIMARY KEY, {CALLED}, UNIQUE ({CALLED}));
+    CREATE TABLE results (number INTEGER, run INTEGER, ordinal INTEGER, value, u, expanded, dof, p, lower, upper, verdict,
+                          certificates, PRIMARY KEY (number, run, ordinal)) WITHOUT ROWID;
+    CREATE INDEX results_by_run ON results (run);
+"""
+"""Results lie together by name, and refer to runs by number; runs refer to what many have in common: so a series or a listing
+of very many is read in a fraction of a second."""

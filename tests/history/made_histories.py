@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
+from bench.findings import SIMULATED_CONTROLLER, Finding
 from bench.quantity import Quantity
 from bench.record.limits import Limit
 from bench.record.outcomes import Outcome
-from bench.record.records import measurement, unfinished, write_record
+from bench.record.records import findings_of, measurement, unfinished, write_record
 from bench.run.indexrow import Result
 from bench.uncertainty import Estimate, Influence
 
@@ -36,7 +37,8 @@ def results(values: Sequence[float], **given: object) -> list[Result]:
     return [result(k, float(v), **given) for k, v in enumerate(values)]
 
 
-def record(root: Path, k: int, value: float, *, days: float = 1.0, plan: int = 9, seed: int | None = None) -> Path:
+def record(root: Path, k: int, value: float, *, days: float = 1.0, plan: int = 9, seed: int | None = None,
+           served: bool = False) -> Path:  # fmt: skip
     """A run directory with the record of the k-th run that measured K_i, scatter and shared influence in its budget."""
     at = START + timedelta(days=days * k)
     path = root / f"amb-calibration-{at:%Y%m%dT%H%M%SZ}-{k:04x}"
@@ -48,6 +50,8 @@ def record(root: Path, k: int, value: float, *, days: float = 1.0, plan: int = 9
         run_id=path.name, procedure="amb-calibration", rig="tsbs12", uut={"serial": "7"}, seed=seed, visit=k,
         plan={"rounds": plan}, started=at.isoformat(), versions={},
     )  # fmt: skip
+    told = findings_of([Finding(SIMULATED_CONTROLLER, "it says so", "controller")] if served else ())
     write_record(path / "record.json", dataclasses.replace(
-        blank, outcome=Outcome.PASS, findings=(), measurements=(measurement(K.measured(estimate), LIMIT),)))  # fmt: skip
+        blank, outcome=Outcome.PASS, ended=at.isoformat(), findings=told,
+        measurements=(measurement(K.measured(estimate), LIMIT),)))  # fmt: skip
     return path

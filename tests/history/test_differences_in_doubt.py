@@ -80,8 +80,8 @@ def test_a_difference_without_a_standard_uncertainty_is_judged_by_its_interval()
 def test_what_an_old_record_does_not_say_is_not_said_to_be_the_same() -> None:
     a, b = (record(run, value(1.0, {GAIN: 1.0})) for run in (A, B))
     told = "\n".join(lines(compared(a, b), differing(a, b), 80))
-    assert "nothing else differs: plan, rig, parameters, firmware, certificates, versions" in told
+    assert "all else is the same: plan, rig, parameters, firmware, certificates, versions" in told
     old = dataclasses.replace(b, setup=None)
     told = "\n".join(lines(compared(a, old), [], 80))
-    assert "nothing else differs: plan, rig, versions" in told
+    assert "all else is the same: plan, rig, versions" in told
     assert "caution: B: a record of before schema 3" in told

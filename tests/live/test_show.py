@@ -310,3 +310,13 @@ def test_what_cannot_be_shown_is_one_message_and_status_2(tmp_path: Path, capsys
             out, err = capsys.readouterr()
             assert (out, err.count("\n")) == ("", 1)
             assert text in err
+
+
+def test_a_real_machine_and_its_twin_are_told_apart(client: Client) -> None:
+    assert get(client, "/runs?filter=real").json["found"] == 10
+    assert [run["machine"] for run in get(client, "/runs?filter=simulated").json["runs"]] == ["simulated"]
+    told = get(client, "/trend?quantity=K_i&machine=real").json
+    assert (told["machine_kind"], told["older"]) == ("real", False)
+    assert get(client, "/trend?quantity=K_i&machine=served").status == 400
+    refused = get(client, "/trend?quantity=K_i&machine=twin")
+    assert (refused.status, "expected real, served, simulated" in refused.body.decode()) == (400, True)

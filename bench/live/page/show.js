@@ -8,6 +8,7 @@ import { element, findingNode } from "./told.js";
 
 const $ = (id) => document.getElementById(id);
 const VIEWS = ["list", "run", "trend"];
+const MACHINES = ["real", "served", "simulated"];
 const MORE = 4; // times as many runs where older ones are asked for
 const TYPED_MS = 200;
 const token = takeToken();
@@ -109,7 +110,7 @@ async function showRun(id) {
 /** A row whose name leads to the trend of that quantity, of this machine. */
 function linkedRow(result, run) {
   const row = resultRow(result);
-  const fields = { view: "trend", quantity: result.name, procedure: run.procedure, rig: run.rig };
+  const fields = { view: "trend", quantity: result.name, procedure: run.procedure, rig: run.rig, machine: run.machine };
   if (run.seed !== null) fields.seed = run.seed;
   row.cells[0].replaceChildren(link(quantityText(result.name), fields));
   return row;
@@ -135,6 +136,7 @@ async function showTrend(fields) {
   $("quantities").replaceChildren(...known.quantities.map((name) => { const o = element("option"); o.value = name; return o; }));
   choices($("procedure"), known.procedures, fields.procedure || "");
   choices($("rig"), known.rigs, fields.rig || "");
+  choices($("machine"), MACHINES, fields.machine || "");
   $("quantity").value = fields.quantity || "";
   $("seed").value = fields.seed || "";
   if (!fields.quantity) return $("quantity").focus();
