@@ -6,7 +6,7 @@ import io
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import matplotlib as mpl
 import numpy as np
@@ -21,6 +21,7 @@ from reports.figurestyle import GRID, INK, PALETTE, STYLE
 
 Array = npt.NDArray[np.float64]
 WIDE_IN = 6.85  # 174 mm: the A4 text block
+PANEL_IN, BETWEEN_IN = 1.25, 0.32  # a row of small panels, and what lies between two of them
 GOOD, BAD = "#0072B2", "#D55E00"
 KINDS = {  # first part of an influence's identity -> legend, colour
     "sensors": ("sensors: gains and offsets", PALETTE[0]),
@@ -182,8 +183,8 @@ def histograms(rows: Sequence[Judged]) -> Drawn:
         for axes, row in zip(panels, rows, strict=False):
             shown = np.clip(row.ratios, -1.999, 1.999)
             axes.axvspan(-1, 1, color="#eef3f7", zorder=0)
-            axes.hist(shown[row.holds], edges, color=GOOD)
-            axes.hist(shown[~row.holds], edges, color=BAD)
+            for some, colour in ((row.holds, GOOD), (~row.holds, BAD)):  # one outline, where `hist` makes a patch a bin
+                axes.stairs(np.histogram(shown[some], edges)[0], edges, fill=True, color=colour)
             count = len(row.ratios) * (edges[1] - edges[0])
             axes.plot(middle, count * 1.96 / math.sqrt(2 * math.pi) * np.exp(-((1.96 * middle) ** 2) / 2), color=INK,
                       linewidth=0.8)  # fmt: skip
@@ -201,8 +202,14 @@ def histograms(rows: Sequence[Judged]) -> Drawn:
 def scatters(rows: Sequence[Judged]) -> Drawn:
     """Error over U by rig: a drift or a cluster shows here and not in a histogram."""
 
+    seeds = np.concatenate([row.seeds for row in rows])
+    first, last = float(seeds.min(initial=np.inf)), float(seeds.max(initial=-np.inf))
+    beside = 0.05 * (last - first) or 0.5
+
     def paint(canvas: Canvas, panels: Sequence[Axes]) -> None:
         for axes, row in zip(panels, rows, strict=False):
+            if len(seeds):
+                axes.set_xlim(first - beside, last + beside)
             axes.axhspan(-1, 1, color="#eef3f7", zorder=0)
             shown = np.clip(row.ratios, -2.4, 2.4)
             size = 1.6 if len(row.seeds) > 200 else 2.6
@@ -228,20 +235,32 @@ def _multiples(
     lines = math.ceil(len(rows) / columns)
 
     def whole(canvas: Canvas) -> None:
-        panels: list[Axes] = list(canvas.subplots(lines, columns, sharex=True, squeeze=False).ravel())
+        panels: list[Axes] = list(
+            canvas.subplots(lines, columns, squeeze=False).ravel()
+        )  # shared axes cost their square
+        _spread(canvas, lines, columns)
         paint(canvas, panels)
         for number, axes in enumerate(panels):
             if number >= len(rows):
                 axes.set_visible(False)
                 continue
             _quiet(axes, "y")
+            axes.tick_params(labelbottom=number >= len(rows) - columns)
             if number >= len(rows) - columns:
                 axes.set_xlabel(x)
-                axes.tick_params(labelbottom=True)
             if number % columns == 0:
                 axes.set_ylabel(y)
 
-    return _drawn(key, title, caption, (WIDE_IN, 0.35 + 1.25 * lines), whole)
+    return _drawn(key, title, caption, (WIDE_IN, 0.35 + PANEL_IN * lines), whole, layout=None)
+
+
+def _spread(canvas: Canvas, lines: int, columns: int) -> None:
+    """Panels of one size with room for their ticks and titles: matplotlib's own layout measures every letter of a hundred of
+    them twice."""
+    wide, high = canvas.get_size_inches()
+    room = {"left": 0.5 / wide, "right": 1 - 0.08 / wide, "bottom": 0.42 / high, "top": 1 - 0.22 / high}
+    across, down = (wide - 0.58) / columns, (high - 0.64) / lines
+    canvas.subplots_adjust(**room, wspace=BETWEEN_IN / (across - BETWEEN_IN), hspace=BETWEEN_IN / (down - BETWEEN_IN))
 
 
 def _quiet(axes: Axes, grid: Any) -> None:
@@ -251,10 +270,11 @@ def _quiet(axes: Axes, grid: Any) -> None:
 
 
 def _drawn(
-    key: str, title: str, caption: str, size: tuple[float, float], paint: Callable[[Canvas], None]
+    key: str, title: str, caption: str, size: tuple[float, float], paint: Callable[[Canvas], None],
+    layout: Literal["constrained"] | None = "constrained",
 ) -> Drawn:  # fmt: skip
     with mpl.rc_context({**STYLE, "text.parse_math": True, "mathtext.fontset": "dejavusans"}):
-        canvas = Canvas(figsize=size, layout="constrained")
+        canvas = Canvas(figsize=size, layout=layout)
         FigureCanvasSVG(canvas)
         paint(canvas)
         out = io.StringIO()

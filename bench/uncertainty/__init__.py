@@ -6,7 +6,7 @@ GUM is JCGM 100:2008; JCGM 101:2008 is its supplement on Monte Carlo.
 from bench.uncertainty.budgets import BudgetRow, budget, power_out, round_to_uncertainty, rounded_at, stated
 from bench.uncertainty.coverage import PROBABILITY, Interval, coverage_factor, interval, welch_satterthwaite
 from bench.uncertainty.estimate import Distribution, Estimate, Influence, correlation, correlation_matrix
-from bench.uncertainty.propagation import propagate
+from bench.uncertainty.propagation import propagate, propagate_stacked
 from bench.uncertainty.series import SeriesMean, batch_means
 
 __all__ = [
@@ -25,6 +25,7 @@ __all__ = [
     "interval",
     "power_out",
     "propagate",
+    "propagate_stacked",
     "round_to_uncertainty",
     "rounded_at",
     "stated",

@@ -115,10 +115,10 @@ def interval(estimate: Estimate, seed: int = 0) -> Interval:
     except ManyDraws:
         drawn, unsure = _in_batches(estimate, seed, deviations)
         reason += f"; the model was asked for {len(drawn)} draws, which leave {unsure:.1%} of U open at its ends"
-    low, high = (float(q) for q in np.quantile(drawn, [0.025, 0.975]))
+    low, middle, high = (float(q) for q in np.quantile(drawn, [0.025, 0.5, 0.975]))
     if not (math.isfinite(low) and math.isfinite(high)):
         raise AnalysisError("the model does not give finite numbers over the spread of its inputs")
-    u = None if _few(estimate) else _standard_deviation(drawn)
+    u = None if _few(estimate) else _standard_deviation(drawn, middle)
     beyond = tails_of_draws(drawn, estimate.value, low, high)
     stated = _stated(low, high, dof, "monte-carlo", reason if u is not None else f"{reason}; {NO_U}", u, beyond)
     return stated if u is None else replace(stated, contributions=_contributions(estimate, deviations, drawn, u))
@@ -151,10 +151,10 @@ def _few(estimate: Estimate) -> bool:
     return any(i.dof <= FEW and i.u > 0 and (c != 0 or estimate.nonlinear) for i, c in estimate.sensitivities.items())
 
 
-def _standard_deviation(drawn: Array) -> float | None:
-    """Of the draws; None where one of them alone carries a tenth of the sum of squares: so it is where the distribution has
-    no standard deviation (a ratio whose denominator may be zero), and the next draws would give another number."""
-    middle = float(np.median(drawn))
+def _standard_deviation(drawn: Array, middle: float) -> float | None:
+    """Of the draws, whose median is `middle`; None where one of them alone carries a tenth of the sum of squares: so it is
+    where the distribution has no standard deviation (a ratio whose denominator may be zero), and the next draws would give
+    another number."""
     off = drawn - middle
     total = float(off @ off)
     if not math.isfinite(total) or float(np.abs(off).max()) ** 2 > ONE_DRAW * total:

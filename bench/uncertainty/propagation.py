@@ -14,8 +14,10 @@ from bench.uncertainty.estimate import NONLINEAR, Array, Deviations, Estimate, I
 
 DIRECTIONS = 4  # along which influences are moved together
 BATCH = 2_000  # draws for which a model itself is asked at a time: 100/(1 - 0.95), JCGM 101, 7.9.4 b
+STACK = 256  # sets of inputs that a stacked model is given at a time: some megabytes of small matrices
 Inputs = Mapping[str, Estimate]
-Shares = Mapping[str, tuple[float, Mapping[str, float]]]  # value and contributions by influence
+Stacked = Callable[[dict[str, Array]], Mapping[str, Array]]
+"""A model of many sets of inputs at once: each input (n,) by name, and so each output."""
 _ONE = ""  # name of the output of a model that returns one number
 
 
@@ -40,79 +42,107 @@ def propagate(
     Raises:
         AnalysisError: an output is not finite, or one id stands for two different influences.
     """
-    centre = f({name: e.value for name, e in inputs.items()})
-    middle = _named(centre)
+    out = propagate_stacked(_one_by_one(f), inputs)
+    return out[_ONE] if list(out) == [_ONE] else out
+
+
+def propagate_stacked(f: Stacked, inputs: Inputs) -> dict[str, Estimate]:
+    """As `propagate`, of a model that takes all the moved inputs at once, in stacks: where small matrices are most of a model,
+    numpy solves hundreds of them in the time that it takes to be called for one.
+
+    Raises:
+        AnalysisError: as `propagate`.
+    """
     influences = [i for i in merged((1.0, e) for e in inputs.values()) if i.u > 0]
-    slopes: dict[str, dict[Influence, float]] = {name: {} for name in middle}
-    bends: dict[str, float] = dict.fromkeys(middle, 0.0)
-    traces: dict[str, float] = dict.fromkeys(middle, 0.0)
-    shares = {name: (e.value, e.contributions) for name, e in inputs.items()}
-    for influence in influences:
-        up, down = (_named(f(_shifted(shares, influence, side))) for side in (1.0, -1.0))
-        for name in middle:
-            slopes[name][influence] = (up[name] - down[name]) / (2 * influence.u)
-            second = up[name] - 2 * middle[name] + down[name]
-            bends[name], traces[name] = max(bends[name], abs(second)), traces[name] + second
-    between = _between(lambda z: _named(f(_moved(shares, z))), influences, middle, traces)
+    centre = np.array([e.value for e in inputs.values()])
+    shares = _shares(inputs, influences)
+    directions = _directions(len(influences)) @ shares
+    points = np.concatenate([centre[None], centre + shares, centre - shares, centre + directions, centre - directions])
+    asked = _asked(f, dict(zip(inputs, points.T, strict=True)))
+    curved = any(e.nonlinear for e in inputs.values())
     out = {}
-    for name, value in middle.items():
-        linear = Estimate(value, "", slopes[name])
-        bent = max(bends[name], between[name]) > NONLINEAR * linear.u or any(e.nonlinear for e in inputs.values())
-        out[name] = Estimate(value, "", slopes[name], _sampler(f, inputs, name, influences)) if bent else linear
-    return out if isinstance(centre, dict) else out[_ONE]
+    for name, y in asked.items():
+        slopes, bend = _differences(y, influences)
+        linear = Estimate(float(y[0]), "", slopes)
+        bent = curved or bend > NONLINEAR * linear.u
+        out[name] = Estimate(float(y[0]), "", slopes, _sampler(f, inputs, name, influences)) if bent else linear
+    return out
+
+
+def _one_by_one(f: Callable[[dict[str, float]], float] | Callable[[dict[str, float]], dict[str, float]]) -> Stacked:
+    """A model of single numbers as one of stacks."""
+
+    def stacked(inputs: dict[str, Array]) -> dict[str, Array]:
+        rows = zip(*(v.tolist() for v in inputs.values()), strict=True) if inputs else [()]
+        found = [_named(f(dict(zip(inputs, row, strict=True)))) for row in rows]
+        return {name: np.array([one[name] for one in found]) for name in found[0]}
+
+    return stacked
 
 
 def _named(result: float | dict[str, float]) -> dict[str, float]:
-    named = {k: float(v) for k, v in result.items()} if isinstance(result, dict) else {_ONE: float(result)}
-    for name, value in named.items():
-        if not math.isfinite(value):
+    return {k: float(v) for k, v in result.items()} if isinstance(result, dict) else {_ONE: float(result)}
+
+
+def _asked(f: Stacked, inputs: dict[str, Array]) -> dict[str, Array]:
+    """Outputs (n,) by name for inputs (n,), STACK at a time."""
+    count = max((len(v) for v in inputs.values()), default=1)
+    parts = [f({name: v[at : at + STACK] for name, v in inputs.items()}) for at in range(0, count, STACK)]
+    out = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    for name, y in out.items():
+        for value in y[~np.isfinite(y)]:
             raise AnalysisError(f"the model gives {value} for {name or 'its output'}; expected a finite number")
-    return named
+    return out
 
 
-def _shifted(shares: Shares, influence: Influence, side: float) -> dict[str, float]:
-    return {name: value + side * share.get(influence.id, 0.0) for name, (value, share) in shares.items()}
+def _shares(inputs: Inputs, influences: Sequence[Influence]) -> Array:
+    """(n, m): how far a standard uncertainty of each influence moves each input."""
+    row = {influence.id: k for k, influence in enumerate(influences)}
+    out = np.zeros((len(influences), len(inputs)))
+    for column, e in enumerate(inputs.values()):
+        for key, share in e.contributions.items():
+            if key in row:
+                out[row[key], column] = share
+    return out
 
 
-def _moved(shares: Shares, by: Mapping[str, float]) -> dict[str, float]:
-    """Inputs with influences, by id, moved by so many standard uncertainties."""
-    return {key: v + sum(share.get(i, 0.0) * z for i, z in by.items()) for key, (v, share) in shares.items()}
+def _differences(y: Array, influences: Sequence[Influence]) -> tuple[dict[Influence, float], float]:
+    """Slopes by influence, and how much an output bends: along one, or between two of them. `y` is the output where nothing is
+    moved, each influence up, each down, and all of them along the `_directions` and back."""
+    n = len(influences)
+    middle, up, down = y[0], y[1 : n + 1], y[n + 1 : 2 * n + 1]
+    there, back = y[2 * n + 1 :].reshape(2, -1)
+    slopes = {i: float(a - b) / (2 * i.u) for i, a, b in zip(influences, up, down, strict=True)}
+    second = up - 2 * middle + down
+    between = _between(n, there - 2 * middle + back, float(second.sum()))
+    return slopes, max(float(np.abs(second).max(initial=0.0)), between)
 
 
-def _between(
-    model: Callable[[Mapping[str, float]], dict[str, float]],
-    influences: Sequence[Influence],
-    middle: Mapping[str, float],
-    traces: Mapping[str, float],
-) -> dict[str, float]:
-    """How much each output bends between two influences: root of the sum of squares of the mixed second differences.
-
-    Along a direction s of n signs the second difference is the trace plus the sum of s_i s_j H_ij, whose mean square over
-    random signs is twice the sum of squares (Hutchinson, Commun. Stat. Simul. Comput. 19, 433 (1990)): 2 DIRECTIONS
-    evaluations in place of n^2. The step is one standard uncertainty in all, to stay as near as one influence does.
-    """
-    n, squares = len(influences), dict.fromkeys(middle, 0.0)
+def _directions(n: int) -> Array:
+    """Signs in which n influences are moved together, one standard uncertainty in all, to stay as near as one influence does;
+    none where there are not two of them."""
     if n < 2:
-        return squares
+        return np.zeros((0, n))
     step = 1 / math.sqrt(n)
-    signs = np.random.default_rng(n).choice([-step, step], (DIRECTIONS, n))
-    for row in signs:
-        up, down = (model({i.id: float(side * s) for i, s in zip(influences, row, strict=True)}) for side in (1, -1))
-        for name, value in middle.items():
-            squares[name] += (n * (up[name] - 2 * value + down[name]) - traces[name]) ** 2 / (2 * DIRECTIONS)
-    return {name: math.sqrt(square) for name, square in squares.items()}
+    return np.asarray(np.random.default_rng(n).choice([-step, step], (DIRECTIONS, n)))
 
 
-def _sampler(
-    f: Callable[[dict[str, float]], float] | Callable[[dict[str, float]], dict[str, float]],
-    inputs: Inputs,
-    name: str,
-    influences: Sequence[Influence],
-) -> Sampler:
+def _between(n: int, second: Array, trace: float) -> float:
+    """How much an output bends between two influences: root of the sum of squares of the mixed second differences.
+
+    Along a direction s of n signs the `second` difference is the trace plus the sum of s_i s_j H_ij, whose mean square over
+    random signs is twice the sum of squares (Hutchinson, Commun. Stat. Simul. Comput. 19, 433 (1990)): 2 DIRECTIONS
+    evaluations in place of n^2.
+    """
+    return math.sqrt(float(((n * second - trace) ** 2).sum()) / (2 * DIRECTIONS))
+
+
+def _sampler(f: Stacked, inputs: Inputs, name: str, influences: Sequence[Influence]) -> Sampler:
     shares = {key: (e.value, e.contributions) for key, e in inputs.items()}
 
     def shifted(by: Mapping[str, float]) -> float:
-        return _named(f(_moved(shares, by)))[name]
+        moved = {key: v + sum(share.get(i, 0.0) * z for i, z in by.items()) for key, (v, share) in shares.items()}
+        return float(_asked(f, {key: np.array([v]) for key, v in moved.items()})[name][0])
 
     def sampled(deviations: Deviations) -> Array:
         if max((len(v) for v in deviations.values()), default=1) > BATCH:  # for fewer the expansion asks as often
@@ -123,10 +153,6 @@ def _sampler(
             return quick
         drawn = {key: e.sampled(deviations) for key, e in inputs.items()}
         count = max((len(v) for v in drawn.values()), default=1)
-        full = {key: np.broadcast_to(v, (count,)) for key, v in drawn.items()}
-        out = np.empty(count)
-        for k in range(count):
-            out[k] = _named(f({key: float(v[k]) for key, v in full.items()}))[name]
-        return out
+        return _asked(f, {key: np.broadcast_to(v, (count,)) for key, v in drawn.items()})[name]
 
     return sampled

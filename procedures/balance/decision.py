@@ -15,7 +15,7 @@ import numpy.typing as npt
 from bench.analysis.balance import bound, split
 from bench.findings import Effect, Finding
 from bench.rigfile import RigFile
-from bench.uncertainty import propagate
+from bench.uncertainty import propagate_stacked
 from bench.units import RPM
 from procedures.amb_rotor.conventions import conventions
 from procedures.balance.estimates import Balanced
@@ -49,7 +49,7 @@ def gain(rig: RigFile, plan: Plan, plane: int) -> float:
     stand = Stand.of({n: e.value for n, e in bearings.collect_inputs(rig, known).items()})
     arm = (-stand.l_iu, stand.l_ou)[plane]
     own = max(abs(1 / stand.mass + arm * at / stand.inertia) for at in (-stand.l_is, stand.l_os))
-    return (_amplified(rig, plan, stand) if _loop_is_known(rig, plan) else AMPLIFIED) * own
+    return float((_amplified(rig, plan, stand) if _loop_is_known(rig, plan) else AMPLIFIED) * own)
 
 
 def _loop_is_known(rig: RigFile, plan: Plan) -> bool:
@@ -134,14 +134,15 @@ def observe(before: Run, having: Run, weight: Weight, rig: RigFile, known: Known
     def turn_u(k: int) -> float:
         """Near the rigid modes a share of the forces counts several times: at 4000 r/min gap, offsets and betas make 9°."""
 
-        def turn(v: Mapping[str, float]) -> float:
+        def turn(v: Mapping[str, Array]) -> dict[str, Array]:
             s = Stand.of(v)
-            return float(np.angle(added(s, k)[weight.plane] / added(s, -1)[weight.plane]))
+            return {"turn": np.angle(added(s, k)[..., weight.plane] / added(s, -1)[..., weight.plane])}
 
-        return propagate(turn, inputs).u
+        return propagate_stacked(turn, inputs)["turn"].u
 
     def size_u() -> float:
-        by_forces = propagate(lambda v: float(abs(added(Stand.of(v), -1)[weight.plane])), inputs).u
+        sizes = propagate_stacked(lambda v: {"size": np.abs(added(Stand.of(v), -1)[..., weight.plane])}, inputs)
+        by_forces = sizes["size"].u
         by_noise = _scatter(nominal, pairs[-1], weight.plane) / abs(u)
         stated = math.hypot(own.radius.u / own.radius.value, own.weight_mass.standard_uncertainty / weight.kg)
         return math.hypot(by_forces, by_noise, stated)

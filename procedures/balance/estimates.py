@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +13,7 @@ import numpy.typing as npt
 from bench.analysis.balance import allocated, permissible
 from bench.analysis.vectors import Vectors
 from bench.rigfile import RigFile
-from bench.uncertainty import Estimate, Influence, propagate, welch_satterthwaite
+from bench.uncertainty import Estimate, Influence, propagate, propagate_stacked, welch_satterthwaite
 from bench.uncertainty.estimate import merged
 from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.lengths import lengths_by_name
@@ -90,18 +91,18 @@ def solve_runs(
     speeds = np.array([r.speed for r in trials.base.reads])
     near = (speeds / (2 * math.pi * plan.bending_hz)) ** 2 if plan.bending_hz else 0 * speeds
 
-    def parted(v: dict[str, float]) -> dict[str, float]:
+    def parted(v: dict[str, Array]) -> dict[str, Array]:
         s, found = _solve_with(v, slow, trials, near)
-        out: dict[str, float] = {}
+        bent = np.stack([v[f"nonlinear_re_{p}"] + 1j * v[f"nonlinear_im_{p}"] for p in (0, 1)], axis=-1)
+        out: dict[str, Array] = {}
         for run in runs:
-            u = found.unbalance(_readings(run) / s.gain)
-            whole = replace(found, taken=0 * found.taken).unbalance(_readings(run) / s.gain)
-            u = u + whole * [complex(v[f"nonlinear_re_{p}"], v[f"nonlinear_im_{p}"]) for p in (0, 1)]
+            read = _readings(run) / s.gain[:, None]
+            u = found.unbalance(read) + replace(found, taken=0 * found.taken).unbalance(read) * bent
             u = all_told(planes, u, (v["scale_0"], v["scale_1"]))
-            out |= {f"{run.name}/{k}": float(x) for k, x in enumerate(u.view(np.float64))}
+            out |= {f"{run.name}/{k}": x for k, x in enumerate(u.view(np.float64).T)}
         return out
 
-    out = propagate(parted, inputs)
+    out = propagate_stacked(parted, inputs)
     stand, nominal = _solve_with({name: e.value for name, e in inputs.items()}, slow, trials, near)
     parts = {}
     for run in runs:
@@ -114,21 +115,22 @@ def solve_runs(
     return Balanced(trials, nominal, unbalance, parts, permissible_of_planes(rig, plan), planes)
 
 
-def _solve_with(v: Mapping[str, float], slow: Read | None, trials: Trials, near: Array) -> tuple[Stand, Solved]:
-    """The stand and the solution with these inputs; `near` (s,), each speed over the first bending mode's, squared."""
+def _solve_with(v: Mapping[str, Any], slow: Read | None, trials: Trials, near: Array) -> tuple[Stand, Solved]:
+    """The stand and the solution with these inputs, or a stack of them; `near` (s,), each speed over the first bending mode's,
+    squared."""
     s = Stand.of(v)
     some = [(_fixed(v, trials.planes, p), _turnings(trials.before[p]), _turnings(trials.having[p])) for p in (0, 1)]
     found = solve(s, None if slow is None else slow.turning, some, _turnings(trials.base))
     if slow is None:
         lost = runout_as_unbalance(s, _turnings(trials.base), _unknown(v), found.mark)
         found = replace(found, taken=found.taken + lost)
-    bent = np.array([[v[f"bending_{j}{k}"] for k in (0, 1)] for j in (0, 1)])
-    return s, replace(found, taken=found.taken + near[:, None] * (found.taken @ bent.T))
+    bent = runout.matrix([[v[f"bending_{j}{k}"] for k in (0, 1)] for j in (0, 1)])
+    return s, replace(found, taken=found.taken + near[:, None] * (found.taken @ bent.mT))
 
 
-def _fixed(v: Mapping[str, float], planes: Planes, p: int) -> complex:
+def _fixed(v: Mapping[str, Any], planes: Planes, p: int) -> Any:
     """A plane's trial weight, kg m from the mark."""
-    return complex(v[f"kg_{p}"] * v[f"radius_{p}"] * np.exp(1j * planes[p].from_mark(v[f"angle_{p}"], v[f"scale_{p}"])))
+    return v[f"kg_{p}"] * v[f"radius_{p}"] * np.exp(1j * planes[p].from_mark(v[f"angle_{p}"], v[f"scale_{p}"]))
 
 
 def _turnings(run: Run) -> list[Turning]:
@@ -147,9 +149,9 @@ def _unmeasured(rig: RigFile) -> dict[str, Estimate]:
             for n in names}  # fmt: skip
 
 
-def _unknown(v: Mapping[str, float]) -> Complex:
+def _unknown(v: Mapping[str, Any]) -> Complex:
     i, o = (v[f"unknown_re_{b}"] + 1j * v[f"unknown_im_{b}"] for b in "io")
-    return np.array([i, -1j * i, o, -1j * o])
+    return np.stack([i, -1j * i, o, -1j * o], axis=-1)
 
 
 def _bending() -> dict[str, Estimate]:

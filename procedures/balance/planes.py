@@ -6,10 +6,10 @@ on it stands at zero + sense a from the mark. An unbalance is solved from the ma
 
 from __future__ import annotations
 
-import cmath
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -43,20 +43,20 @@ class Plane:
     positions: int
     scaled: bool
 
-    def from_mark(self, angle: float, zero: float | None = None) -> float:
-        """Of an angle on the scale, rad; by another zero than the rig file's where one is given."""
+    def from_mark(self, angle: Any, zero: Any = None) -> Any:
+        """Of an angle on the scale, rad; by another zero than the rig file's where one is given. So of stacks (n,)."""
         return (self.zero.value if zero is None else zero) + self.sense * angle
 
     def turned(self, u: complex, zero: float | None = None) -> complex:
         """An unbalance that stands on the scale, from the mark."""
         begins = self.zero.value if zero is None else zero
         seen = u if self.sense > 0 else u.conjugate()
-        return seen * cmath.exp(1j * begins) if begins else seen
+        return complex(seen * np.exp(1j * begins))
 
-    def told(self, u: complex, zero: float | None = None) -> complex:
-        """An unbalance from the mark as the scale has it."""
+    def told(self, u: Any, zero: Any = None) -> Any:
+        """An unbalance from the mark as the scale has it; so stacks of them (n,)."""
         begins = self.zero.value if zero is None else zero
-        back = u * cmath.exp(-1j * begins) if begins else u
+        back = u * np.exp(-1j * begins)
         return back if self.sense > 0 else back.conjugate()
 
 
@@ -134,10 +134,9 @@ def _weight(places: Places, plane: BalancingPlane, key: str, what: str) -> Toler
     return places.number(stated, f"{key}.{what}").number
 
 
-def all_told(planes: Planes, from_mark: Sequence[complex] | Complex, zeros: Sequence[float] = ()) -> Complex:
-    """Unbalances from the mark on the scales of their planes."""
-    begins = tuple(zeros) or (None, None)
-    return np.array([p.told(complex(u), z) for p, u, z in zip(planes, from_mark, begins, strict=True)])
+def all_told(planes: Planes, from_mark: Complex, zeros: Sequence[Any]) -> Complex:
+    """Unbalances (..., 2) from the mark on the scales of their planes, which begin at `zeros`."""
+    return np.stack([p.told(from_mark[..., k], zeros[k]) for k, p in enumerate(planes)], axis=-1)
 
 
 def describe(plane: Plane) -> str:

@@ -116,5 +116,4 @@ def _slow(s: Stand, solution: Solved, slow: Read, trials: Trials) -> Complex:
         )
 
     start, size = at(slow.vectors.values), 1e-6
-    columns = [(at(slow.vectors.values + size * np.eye(12)[n]) - start) / size for n in range(12)]
-    return np.stack(columns, axis=-1)
+    return np.moveaxis((at(slow.vectors.values + size * np.eye(12)) - start) / size, 0, -1)

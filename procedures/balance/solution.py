@@ -17,10 +17,10 @@ import numpy.typing as npt
 from procedures.balance.planes import Planes
 from procedures.balance.steps import Run, Weight
 from procedures.synchronous import runout
-from procedures.synchronous.runout import Stand, Turning
+from procedures.synchronous.runout import Number, Stand, Turning, times
 
 Complex = npt.NDArray[np.complex128]
-Trial = tuple[complex, Sequence[Turning], Sequence[Turning]]
+Trial = tuple[Number, Sequence[Turning], Sequence[Turning]]
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Solved:
 
     influence: Complex
     placed: Complex
-    mark: float
+    mark: Number
     runout: Complex
     taken: Complex
 
@@ -59,30 +59,31 @@ class Solved:
 
     def unbalance(self, readings: Complex) -> Complex:
         """Unbalance (2,) kg m on the scale, from readings (s, 4) m over gain."""
-        a = self.influence.reshape(-1, 2)
-        clean = readings - np.einsum("spq,sq->sp", self.influence, self.taken)
-        return np.asarray(np.linalg.lstsq(a, clean.reshape(-1), rcond=None)[0])
+        a, clean = self.influence, readings - np.einsum("...spq,...sq->...sp", self.influence, self.taken)
+        every = (*a.shape[:-3], -1)  # speed and probe
+        return np.asarray(times(np.linalg.pinv(a.reshape(*every, 2)), clean.reshape(every)))
 
 
 def solve(s: Stand, slow: Turning | None, trials: Sequence[Trial], base: Sequence[Turning]) -> Solved:
-    """Influence coefficients and what they need, of one set of numbers. `trials` by plane: weight kg m on the scale, readings
-    by speed before it was fixed and with it. The
+    """Influence coefficients and what they need, of one set of numbers or of a stack. `trials` by plane: weight kg m on the
+    scale, readings by speed before it was fixed and with it. The
     mark's angle is that of the highest speed, where masses rule and not the bearings."""
-    found = np.zeros(4, complex) if slow is None else runout.find_runout(s, {1.0: slow}, base[-1]).runout[1.0]
-    count = len(base)
-    influence, moved = np.zeros((count, 4, 2), complex), np.zeros((2, 2), complex)
-    for p, (u, before, having) in enumerate(trials):
-        for k, (a, b) in enumerate(zip(before, having, strict=True)):
-            influence[k, :, p] = (b.vectors - a.vectors)[:4] / s.gain / u
-            if k == count - 1:
-                none = np.zeros(4, complex)
-                moved[p] = (runout.unbalances(s, b, none)[0] - runout.unbalances(s, a, none)[0]) / u
-    mark = float(np.angle(moved[0, 0] + moved[1, 1]))
-    return Solved(influence, moved * np.exp(-1j * mark), mark, found, runout_as_unbalance(s, base, found, mark))
+    none = np.zeros(4, complex)
+    found = none if slow is None else runout.find_runout(s, {1.0: slow}, base[-1]).runout[1.0]
+    influence, moved = [], []
+    for weight, before, having in trials:
+        u = np.asarray(weight)[..., None]
+        changes = [(b.vectors - a.vectors)[:4] / s.gain / u for a, b in zip(before, having, strict=True)]
+        influence.append(np.stack(changes, axis=-2))
+        one, other = (runout.unbalances(s, of[-1], none)[0] for of in (before, having))
+        moved.append((other - one) / u)
+    by_weight: Complex = np.stack(moved, axis=-2)
+    mark = np.angle(np.trace(by_weight, axis1=-2, axis2=-1))
+    placed = by_weight * np.exp(-1j * mark)[..., None, None]
+    return Solved(np.stack(influence, axis=-1), placed, mark, found, runout_as_unbalance(s, base, found, mark))
 
 
-def runout_as_unbalance(s: Stand, base: Sequence[Turning], off: Complex, mark: float) -> Complex:
+def runout_as_unbalance(s: Stand, base: Sequence[Turning], off: Complex, mark: Number) -> Complex:
     """The unbalance by speed (s, 2) kg m on the scale that a runout `off` (4,) m is taken for."""
-    back = np.exp(-1j * mark)
-    out: Complex = np.array([runout.as_unbalance(s, t.means, off, t.speed) * back for t in base])
-    return out
+    back = np.exp(-1j * mark)[..., None]
+    return np.stack([runout.as_unbalance(s, t.means, off, t.speed) * back for t in base], axis=-2)

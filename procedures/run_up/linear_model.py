@@ -126,8 +126,7 @@ def _decentral(s: Stand, t: _Turns, k_p: Array, k_n: Array, k_x: Array) -> Compl
     """Z (b, 4, 4) where each coil answers to its own probe."""
     answer = (k_p * t.i1[::2] + k_n * t.i1[1::2]) / t.read
     at_amb, at_probe = s.axes, s.probes
-    alone = [impedance(s, k_x[:, b], w, w) for b, w in enumerate(t.speed)]
-    return np.array([z - at_amb.T @ (answer[:, b, None] * at_probe) for b, z in enumerate(alone)])
+    return np.asarray(impedance(s, k_x.T, t.speed, t.speed) - at_amb.T @ (answer.T[..., None] * at_probe))
 
 
 def _flat(
@@ -145,5 +144,5 @@ def _flat(
     rate = 1j * w / (1 + 1j * w / (2 * math.pi * gains[flat.derivative_hz]))
     meant = gains[flat.k1] + gains[flat.k2] * rate + gains[flat.integral] * gains[flat.k0] / (1j * w)
     turned = g / meant
-    free = np.array([impedance(s, np.zeros(4), x, x) for x in w])
+    free = impedance(s, np.zeros(4), w, w)
     return free - held + g[:, None, None] * mass, turned / np.abs(turned)

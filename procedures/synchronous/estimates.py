@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +13,7 @@ import numpy.typing as npt
 from bench.analysis.orbits import Ellipse, ellipse
 from bench.analysis.vectors import Vectors, estimates
 from bench.rigfile import RigFile
-from bench.uncertainty import Estimate, Influence, propagate, welch_satterthwaite
+from bench.uncertainty import Estimate, Influence, propagate, propagate_stacked, welch_satterthwaite
 from bench.uncertainty.estimate import merged
 from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.machine import AmbRotor
@@ -125,8 +126,8 @@ def _runouts(inputs: Mapping[str, Estimate], rig: RigFile, slow: Dwell | None, f
         )
     }
 
-    def at(v: Mapping[str, float]) -> dict[float, Turning]:
-        rows = {n: np.array([v[f"s{n:g}_{k}"] for k in range(24)]).view(complex) for n in orders}
+    def at(v: Mapping[str, Any]) -> dict[float, Turning]:
+        rows = {n: np.stack([v[f"s{n:g}_{k}"] for k in range(24)], axis=-1).view(complex) for n in orders}
         return {n: Turning(slow.speed, slow.means, row) for n, row in rows.items()}
 
     values = {name: e.value for name, e in {**inputs, **scatter}.items()}
@@ -137,11 +138,11 @@ def _runouts(inputs: Mapping[str, Estimate], rig: RigFile, slow: Dwell | None, f
 
     names = _parts(conventions(rig))
 
-    def model(v: dict[str, float]) -> dict[str, float]:
+    def model(v: dict[str, Array]) -> dict[str, Array]:
         made = runout.find_runout(Stand.of(v), at(v), high, more)
-        return {f"{n:g}{p}": x for n in orders for p, x in zip(names, made.runout[n].view(float), strict=True)}
+        return {f"{n:g}{p}": x for n in orders for p, x in zip(names, made.runout[n].view(float).T, strict=True)}
 
-    out = propagate(model, {**inputs, **scatter})
+    out = propagate_stacked(model, {**inputs, **scatter})
     made = runout.find_runout(Stand.of(values), at(values), high, more)
 
     def of(n: float) -> Runout:

@@ -5,15 +5,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from bench.analysis.vectors import estimates
-from bench.uncertainty import Estimate, propagate
+from bench.uncertainty import Estimate, propagate_stacked
 from procedures.synchronous.dwells import Dwell
 from procedures.synchronous.runout import Stand, Turning, left_over
 
+Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 UNEXPLAINED = 0.1  # share of the forces that two unbalances leave over: a channel is not what its name says
 TIMES_U = 3.0  # of the share's own standard uncertainty: what a sound machine leaves over
@@ -32,14 +34,14 @@ def share_u(d: Dwell, inputs: Mapping[str, Estimate], runout: Sequence[Estimate]
     scatter = estimates(read.parts, read.covariance, f"scatter/{d.where}/1", "scatter of the dwell", "", read.dof)
     drawn = {f"read_{k}": e for k, e in enumerate(scatter)} | {f"runout_{k}": e for k, e in enumerate(runout)}
 
-    def at(v: Mapping[str, float]) -> tuple[Complex, float]:
-        vectors = np.array([v[f"read_{k}"] for k in range(24)]).view(complex)
-        off = np.array([v[f"runout_{k}"] for k in range(8)]).view(complex)
+    def at(v: Mapping[str, Any]) -> tuple[Complex, Any]:
+        vectors = np.stack([v[f"read_{k}"] for k in range(24)], axis=-1).view(complex)
+        off = np.stack([v[f"runout_{k}"] for k in range(8)], axis=-1).view(complex)
         return left_over(Stand.of(v), Turning(d.speed, d.means, vectors), off)[1:]
 
-    def model(v: dict[str, float]) -> dict[str, float]:
-        return {str(k): x for k, x in enumerate(at(v)[0].view(float))}
+    def model(v: dict[str, Array]) -> dict[str, Array]:
+        return {str(k): x for k, x in enumerate(at(v)[0].view(float).T)}
 
     known = {**inputs, **drawn}
     _, whole = at({name: e.value for name, e in known.items()})
-    return math.sqrt(sum(e.u**2 for e in propagate(model, known).values())) / whole
+    return float(math.sqrt(sum(e.u**2 for e in propagate_stacked(model, known).values())) / whole)
