@@ -42,7 +42,7 @@ MACHINE = {"pole_pairs": "1", "polar_inertia": "kg m^2", "ring_inertia": "kg m^2
            "radial_axes": "rad", "runout": "m", "coupling_offset": "m", "mass": "kg", "transverse_inertia": "kg m^2",
            "weight_mass": "kg", "weight_angle": "rad", "drive_drag": "N m",
            "segment_gain": "1", "torque_ripple": "N m/A", "resistance": "Ohm", "rotor_poles": "1", "ring_mass": "kg",
-           "added_mass": "kg", "added_mass_inertia": "kg m^2"}  # fmt: skip
+           "added_mass": "kg", "added_mass_inertia": "kg m^2", "ring_eccentricity": "m"}  # fmt: skip
 OWN = "own_"
 """What the name of a number begins with that a procedure or machine from outside the repository asks for."""
 

@@ -9,11 +9,12 @@ import numpy as np
 
 from bench.findings import Effect, Finding
 from bench.rigfile import RigFile
+from bench.uncertainty import Estimate
 from procedures.actuator_constant.estimates import Looked, Result
 from procedures.actuator_constant.plan import Plan
 from procedures.actuator_constant.steps import Added, Common, Taken
 from procedures.position_loops import recorded
-from procedures.position_loops.motors import around, motors
+from procedures.position_loops.motors import around, inertia, motors
 from procedures.shared import signals
 
 OFF = 0.05  # share by which the captured sine may differ from what was asked for
@@ -79,12 +80,14 @@ def _coils(taken: Sequence[Taken]) -> Iterator[Finding]:
 
 def of_results(results: Sequence[Result], rig: RigFile, plan: Plan) -> Iterator[Finding]:
     """Lines lost in noise or off their curve, places that disagree."""
-    count = sum(len(r.looked) for r in results)
+    count = sum(len(r.looked) + len(r.ringed) for r in results)
     for r in results:
-        for x in r.looked:
+        for x in (*r.looked, *r.ringed):
             yield from _shown(r.loop, x, rig, plan)
             yield from _explained(r.loop, x, count, rig)
-        yield from _agree(r, rig)
+        yield from _agree(r, r.looked, rig)
+        yield from _agree(r, r.ringed, rig)
+        yield from _with_ring(r, rig)
 
 
 def _shown(loop: str, x: Looked, rig: RigFile, plan: Plan) -> Iterator[Finding]:
@@ -105,10 +108,10 @@ def _explained(loop: str, x: Looked, count: int, rig: RigFile) -> Iterator[Findi
         yield Finding("misfit", text, f"{loop}, {x.place.name}", Effect.INDETERMINATE, _concerned(rig, loop))
 
 
-def _agree(r: Result, rig: RigFile) -> Iterator[Finding]:
+def _agree(r: Result, looked: Sequence[Looked], rig: RigFile) -> Iterator[Finding]:
     """A constant is none of the place; a coil that is reversed, or read wrongly, makes it one."""
-    for motor in motors(rig, r.loop):
-        first, *others = [(x.place.name, x.constants[motor]) for x in r.looked]
+    for motor in motors(rig, r.loop) if looked else ():
+        first, *others = [(x.place.name, x.constants[motor]) for x in looked]
         for name, other in others:
             apart = other - first[1]
             if abs(apart.value) > APART * apart.u:
@@ -116,3 +119,30 @@ def _agree(r: Result, rig: RigFile) -> Iterator[Finding]:
                         f"more than {APART:g} standard uncertainties: a coil is reversed or read wrongly.")  # fmt: skip
                 yield Finding("places-disagree", text, motor, Effect.INDETERMINATE, _concerned(rig, r.loop))
                 return
+
+
+def _with_ring(r: Result, rig: RigFile) -> Iterator[Finding]:
+    """Nothing but the inertia may have changed: what pulls back at a place takes the current it took. And the inertia by the
+    ring is the rig file's, or one of them is wrong: another ring, one that slips."""
+    concerned = (*_concerned(rig, r.loop), f"inertia@{r.loop}")
+    for bare, ringed in zip(r.looked, r.ringed, strict=False):
+        (was, u), (now, v) = ((x.response.slope, math.sqrt(x.response.covariance[1, 1])) for x in (bare, ringed))
+        if abs(now - was) > APART * math.hypot(u, v):
+            text = (f"what pulls back there takes {now:.4g} A/rad with the ring on, {was:.4g} A/rad without, more apart than "
+                    f"{APART:g} standard uncertainties: not the inertia alone is another.")  # fmt: skip
+            yield Finding("changed-with-ring", text, f"{r.loop}, {bare.place.name}", Effect.INDETERMINATE, concerned)
+            break
+    if not r.inertias:
+        return
+    found, stated = r.estimates["inertia", r.loop], inertia(rig, r.loop)
+    reach = tolerance(stated)
+    if abs(found.value - stated.value) > reach + APART * found.u:
+        text = (f"the ring gives {found.value:.5g} kg m^2, the rig file {stated.value:.5g} ± {reach:.2g} kg m^2: another ring, "
+                "one that slips or does not sit, or another mover.")  # fmt: skip
+        yield Finding("inertia-contradicted", text, r.loop, Effect.INDETERMINATE, concerned)
+
+
+def tolerance(stated: Estimate) -> float:
+    """How far a stated value may be off: half the width of its interval, all of it where that has ends."""
+    rectangular = all(i.distribution == "rectangular" for i in stated.sensitivities)
+    return stated.u * (math.sqrt(3) if rectangular else 2.0)

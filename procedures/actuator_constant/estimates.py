@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -14,8 +14,9 @@ from bench.uncertainty import Estimate, Influence
 from procedures.actuator_constant import fit
 from procedures.actuator_constant.fit import Line, Response
 from procedures.actuator_constant.plan import Plan
-from procedures.actuator_constant.sines import Place, loops, places
-from procedures.actuator_constant.steps import Added, Array, Taken
+from procedures.actuator_constant.ring import inertias
+from procedures.actuator_constant.sines import Place, loops, places, with_the_ring
+from procedures.actuator_constant.steps import Added, Array, Taken, with_ring
 from procedures.position_loops.injection import ability
 from procedures.position_loops.lines import counted
 from procedures.position_loops.motors import around, cosine, inertia, motors, off, phase_rate
@@ -39,12 +40,14 @@ class Looked:
 @dataclass(frozen=True)
 class Result:
     """Of one loop: what was seen at each place, K_1/K_2 of two motors per ampere that is read (None: one motor, or not looked
-    at), and the quantities by name and place."""
+    at), and the quantities by name and place; `ringed`: the same places with the ring on, and what turns by each."""
 
     loop: str
     looked: list[Looked]
     ratio: Estimate | None = None
     estimates: Found = field(default_factory=dict)
+    ringed: list[Looked] = field(default_factory=list)
+    inertias: list[Estimate] = field(default_factory=list)
 
 
 def results(
@@ -58,6 +61,7 @@ def results(
 
     Raises:
         AnalysisError: lines that fit no mass.
+        NotSeen: a ring makes no difference.
     """
     lost = {m: cosine(rig, m, off(rig, plan.parameters, m, zeros)) for m in rig.capabilities.force_currents}
     of = {loop: [a for a in added if a.common.loop == loop] for loop in loops(rig, plan)}
@@ -69,20 +73,29 @@ def _result(loop: str, taken: Sequence[Taken], added: Sequence[Added], rig: RigF
     driving = list(motors(rig, loop))
     ratio, shares = None, {name: 1 / len(driving) for name in driving}
     if added and len(driving) == 2:
-        there = [t for t in taken if (t.common.loop, t.common.place) == (loop, added[0].common.place)]
+        there = _there(taken, loop, added[0].common.place)
         _, alike = _seen(there, shares, rig)
         ratio = _read_ratio(added, driving, alike.slope, loop)
         shares = {driving[0]: ratio.value / (1 + ratio.value), driving[1]: 1 / (1 + ratio.value)}
-    looked = []
-    for place in places(rig, plan, loop):
-        there = [t for t in taken if (t.common.loop, t.common.place) == (loop, place.name)]
-        lines, response = _seen(there, shares, rig)
-        looked.append(
-            Looked(
-                place, there, lines, response, _constants(loop, place.name, there, lines, response, ratio, rig, lost)
-            )
-        )
-    return Result(loop, looked, ratio, _estimates(loop, looked, ratio, added, rig, lost))
+    looked, ringed = [], []
+    for ring, into in ((False, looked), (True, ringed))[: 1 + (loop in with_the_ring(rig, plan))]:
+        for place in places(rig, plan, loop):
+            there = _there(taken, loop, place.name, ring)
+            lines, response = _seen(there, shares, rig)
+            constants = _constants(loop, there[0].common.at, there, lines, response, ratio, rig, lost)
+            into.append(Looked(replace(place, name=there[0].common.at), there, lines, response, constants))
+    found = inertias([x.constants for x in looked], [x.constants for x in ringed], rig) if ringed else []
+    return Result(loop, looked, ratio, _estimates(loop, looked, ratio, added, rig, lost, found), ringed, found)
+
+
+def _there(taken: Sequence[Taken], loop: str, place: str, ring: bool = False) -> list[Taken]:
+    """Raises:
+    AnalysisError: there is none.
+    """
+    some = [t for t in taken if (t.common.loop, t.common.place, t.common.ring) == (loop, place, ring)]
+    if not some:
+        raise AnalysisError(f"no sines at {with_ring(place) if ring else place} (was the run stopped early?)")
+    return some
 
 
 def _seen(taken: Sequence[Taken], shares: Mapping[str, float], rig: RigFile) -> tuple[list[Line], Response]:
@@ -160,15 +173,18 @@ def _gain(rig: RigFile, motor: str, weights: Array) -> Estimate:
 
 def _estimates(
     loop: str, looked: Sequence[Looked], ratio: Estimate | None, added: Sequence[Added], rig: RigFile,
-    lost: Mapping[str, Estimate],
+    lost: Mapping[str, Estimate], found: Sequence[Estimate],
 ) -> Found:  # fmt: skip
-    driving, turns, moved = motors(rig, loop), around(rig, loop), inertia(rig, loop)
+    driving, turns = motors(rig, loop), around(rig, loop)
+    moved = sum(found, Estimate.exact(0.0, "kg m^2")) * (1 / len(found)) if found else inertia(rig, loop)
     out: Found = {}
     mean = {name: sum((x.constants[name] for x in looked), Estimate.exact(0.0)) * (1 / len(looked)) for name in driving}
     if len(driving) == 1 or ratio is not None:
         out |= {("K_torque" if turns else "K_force", name): k * moved for name, k in mean.items()}
     if turns:
         out["K_over_J", loop] = sum(mean.values(), Estimate.exact(0.0))
+    if found:
+        out["inertia", loop] = moved
     if ratio is not None:
         weights = coil_weights(next(x for x in looked if x.place.name == added[0].common.place).taken)
         first, other = (_gain(rig, name, weights[name]) * lost[name] for name in driving)

@@ -37,6 +37,9 @@ class Plan(BenchPlan):
     pairs: int = Field(5, ge=3)  # of that, either way
     added_settle: float = Field(5.0, ge=3)  # time constants of the loop's integrator after each
     rest_s: float = Field(0.5, ge=0.1)  # over which means are taken then
+    added_inertia: bool = (
+        False  # the ring is put on, and what turns looked at again: its inertia by it, not the rig file's
+    )
     rate_hz: float | None = Field(None, gt=0)  # of captures; none: the nearest to 35 kHz
     max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
     min_signal: float = Field(10.0, gt=1)  # of a line, in its standard uncertainty

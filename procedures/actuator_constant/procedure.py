@@ -1,7 +1,8 @@
 """Constants of a mover's motors from its answer to their currents: force along, torque around, each per ampere.
 
 Measurands, constants per true ampere of the current that gives the force: K_force of a motor along, K_torque of each motor
-around, their sum over the inertia that they turn, the ratio of two motors, and the slope of cogging at each place.
+around, their sum over the inertia that they turn, the ratio of two motors, and the slope of cogging at each place; with a
+ring of known moment of inertia that inertia, too, and K_torque by it.
 """
 
 from __future__ import annotations
@@ -18,11 +19,12 @@ from bench.procedure import Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
+from bench.procedure.states import transition, within_reach
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
-from procedures.actuator_constant import checks, estimates
+from procedures.actuator_constant import checks, estimates, ring
 from procedures.actuator_constant import figures as drawn
 from procedures.actuator_constant.estimates import Result
 from procedures.actuator_constant.plan import Plan
@@ -35,6 +37,7 @@ from procedures.actuator_constant.sines import (
     sine,
     slow_s,
     start_s,
+    with_the_ring,
 )
 from procedures.actuator_constant.steps import ADDED, SINE, STATE, channels, read_added, read_taken
 from procedures.position_loops.injection import BELOW, REFERENCE, ability, injected, parameters_of
@@ -51,7 +54,9 @@ RATIO = Quantity("K_ratio", "1", "constant of one motor over that of the other, 
 SLOPE = Quantity("cogging_stiffness", "N/m", "slope of what pulls back along, at a place", title="cogging stiffness")
 SLOPE_ANGLE = Quantity("cogging_stiffness_angle", "N m/rad", "slope of what turns back, at an angle",
                        title="cogging stiffness around")  # fmt: skip
-MEASURES = (K_FORCE, K_TORQUE, K_OVER_J, RATIO, SLOPE, SLOPE_ANGLE)
+INERTIA = Quantity("inertia", "kg m^2", "of what turns around an axis, by the ratio to a ring of known moment of inertia",
+                   title="moment of inertia")  # fmt: skip
+MEASURES = (K_FORCE, K_TORQUE, K_OVER_J, RATIO, SLOPE, SLOPE_ANGLE, INERTIA)
 MARGIN_S = 1e-3  # of a capture
 OBSERVER = "observer"
 ZEROS = "encoder-zero"
@@ -60,14 +65,16 @@ ZEROS = "encoder-zero"
 def step_count(plan: Plan) -> int:
     """Of two loops, one of which has two motors, for the progress display."""
     added = 2 * plan.pairs if plan.added_A else 0
-    return (len(plan.places_m) + len(plan.angles_rad)) * plan.lines + added
+    around_ = len(plan.angles_rad) * (2 if plan.added_inertia else 1)
+    return (len(plan.places_m) + around_) * plan.lines + added
 
 
 def steps_on(rig: RigFile, plan: Plan) -> int:
     """How many it records on a rig."""
-    return sum(
+    bare = sum(
         len(places(rig, plan, loop)) * plan.lines + 2 * plan.pairs * adds(rig, plan, loop) for loop in loops(rig, plan)
     )
+    return bare + sum(len(places(rig, plan, loop)) * plan.lines for loop in with_the_ring(rig, plan))
 
 
 def adds(rig: RigFile, plan: Plan, loop: str) -> bool:
@@ -89,27 +96,41 @@ def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
-    """Of each loop: go to each place, inject sines; at the first add a current to one of two motors."""
+    """Of each loop: go to each place, inject sines; at the first add a current to one of two motors. What turns once more with
+    the ring on, which an operator puts on and takes off a machine that is off."""
+    numbers = count(1)
+    _look(rig, plan, record, loops(rig.file, plan), numbers, False)
+    if again := with_the_ring(rig.file, plan):
+        with within_reach(rig):
+            rig.operator.mount(ring.NAME)
+        _look(rig, plan, record, again, numbers, True)
+        transition(rig, RigState.OFF)
+        rig.operator.mount("")
+
+
+def _look(rig: Rig, plan: Plan, record: Recorder, at: Iterable[str], numbers: Iterator[int], ringed: bool) -> None:
+    """Some loops, with the ring or without it."""
     for name, value in plan.parameters.items():
         rig.levitation.write({name: value})
-    numbers = count(1)
-    for loop in loops(rig.file, plan):
+    for loop in at:
         for k, place in enumerate(places(rig.file, plan, loop)):
             rig.levitation.write({place.parameter: place.value})
             rig.clock.sleep(plan.settle_s + plan.time_constants * slow_s(rig.file, plan, loop))
             lines = frequencies(rig.file, plan, loop)
             for j, hz in enumerate(lines):
-                _sine(rig, plan, record, loop, place, hz, j == len(lines) // 2, next(numbers))
-            if k == 0 and adds(rig.file, plan, loop):
+                more: dict[str, float | str] = {"number": next(numbers), **({"ring": 1} if ringed else {})}
+                _sine(rig, plan, record, loop, place, hz, j == len(lines) // 2, more)
+            if k == 0 and not ringed and adds(rig.file, plan, loop):
                 _added(rig, plan, record, loop, place)
 
 
-def _sine(rig: Rig, plan: Plan, record: Recorder, loop: str, place: Place, hz: float, whole: bool, number: int) -> None:
+def _sine(rig: Rig, plan: Plan, record: Recorder, loop: str, place: Place, hz: float, whole: bool,
+          more: dict[str, float | str]) -> None:  # fmt: skip
     """Inject, capture, upload."""
     one = sine(rig.file, plan, loop, hz)
     labels: dict[str, float | str] = {
         "loop": loop, "place": place.name, "hz": one.hz, "amplitude": one.amplitude, "periods": one.periods,
-        "samples": one.samples, "whole": int(whole), "number": number,
+        "samples": one.samples, "whole": int(whole), **more,
     }  # fmt: skip
     assert rig.capture is not None
     with injected(rig, loop, REFERENCE, one, start_s(rig.file, plan, loop)):
@@ -147,6 +168,8 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> list[Result]:
     try:
         zeros = recording.calibration(ZEROS).values if needs(plan) else None
         results = estimates.results(taken, added, rig, plan, zeros)
+    except ring.NotSeen as error:
+        findings.end(Finding("part-not-seen", f"{error}", "", Effect.ERROR))
     except AnalysisError as error:
         findings.end(Finding("no-mass", f"{error}.", "", Effect.ERROR))
     findings.add(checks.of_results(results, rig, plan))
@@ -194,6 +217,20 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
         if adds(rig, plan, loop):
             parameter = next(iter(motors(rig, loop).values())).added
             yield from (f"added_A: {problem}" for problem in envelope.problems_of({parameter: plan.added_A}))
+    if plan.added_inertia:
+        yield from _of_ring(rig, plan)
+
+
+def _of_ring(rig: RigFile, plan: Plan) -> Iterator[str]:
+    if not with_the_ring(rig, plan):
+        yield f"added_inertia: found true with loops = {plan.loops!r}; expected a loop around, all or around"
+    if missing := [name for name in (ring.RING, ring.RING_MASS) if name not in rig.machine]:
+        yield f"added_inertia: found true; machine: found no {', '.join(missing)}"
+    elif rig.machine[ring.RING_MASS].value > rig.envelope.max_hung_kg:
+        kg = rig.machine[ring.RING_MASS].value
+        yield f"added_inertia: found a ring of {kg:g} kg; expected {rig.envelope.max_hung_kg:g} kg at most (max_hung_kg)"
+    if not any("operator" in device.roles for device in rig.devices.values()):
+        yield "added_inertia: found true; devices: found none in the role operator, who mounts the ring"
 
 
 def figures(results: Sequence[Result], recording: Recording[Plan]) -> Iterable[Figure]:
@@ -241,13 +278,15 @@ def untold(rig: RigFile) -> tuple[Quantity, ...]:
     turns = [loop for loop in every if around(rig, loop)]
     two = any(adds(rig, Plan.model_validate({}), loop) for loop in every)
     along = () if len(turns) < len(every) else (K_FORCE, SLOPE)
-    return (*along, *(() if turns else (K_TORQUE, K_OVER_J, SLOPE_ANGLE)), *(() if two else (RATIO,)))
+    ringed = () if turns and ring.RING in rig.machine else (INERTIA,)
+    return (*along, *(() if turns else (K_TORQUE, K_OVER_J, SLOPE_ANGLE)), *(() if two else (RATIO,)), *ringed)
 
 
 def left_out(plan: Plan) -> tuple[Quantity, ...]:
     """Those of the other loops, and the ratio where no current is added; which loop has two motors the rig alone knows."""
-    others = {"all": (), "along": (K_TORQUE, K_OVER_J, SLOPE_ANGLE), "around": (K_FORCE, SLOPE)}[plan.loops]
-    return (*others, *(() if plan.added_A and plan.loops == "all" else (RATIO,)))
+    others = {"all": (), "along": (K_TORQUE, K_OVER_J, SLOPE_ANGLE, INERTIA), "around": (K_FORCE, SLOPE)}[plan.loops]
+    ringed = () if plan.added_inertia or plan.loops == "along" else (INERTIA,)
+    return (*others, *ringed, *(() if plan.added_A and plan.loops == "all" else (RATIO,)))
 
 
 procedure = Procedure(

@@ -40,6 +40,11 @@ def places(rig: RigFile, plan: Plan, loop: str) -> tuple[Place, ...]:
     return tuple(Place(f"{x * 1e3:.4g} mm", motion.place, x) for x in plan.places_m)
 
 
+def with_the_ring(rig: RigFile, plan: Plan) -> tuple[str, ...]:
+    """Loops that are looked at again with the ring on."""
+    return tuple(loop for loop in loops(rig, plan) if around(rig, loop)) if plan.added_inertia else ()
+
+
 def rate(rig: RigFile, plan: Plan) -> float:
     """Of captures, Hz."""
     return rate_of(rig, plan.rate_hz, USUAL_HZ)

@@ -21,10 +21,15 @@ SINE, ADDED = "sine", "added"
 STATE = "state"
 
 
+def with_ring(place: str) -> str:
+    """What a place is called where the ring is on."""
+    return f"{place} with the ring"
+
+
 @dataclass(frozen=True)
 class Common:
     """Of any step: the loop, what the place is called, share of the telemetry's samples in which the loop was `limited`, the
-    `states` that the controller was in, samples `lost` of those `expected`."""
+    `states` that the controller was in, samples `lost` of those `expected`; `ring`: with the ring on."""
 
     loop: str
     place: str
@@ -32,6 +37,12 @@ class Common:
     states: tuple[str, ...]
     lost: int
     expected: int
+    ring: bool = False
+
+    @property
+    def at(self) -> str:
+        """The place, and that the ring is on."""
+        return with_ring(self.place) if self.ring else self.place
 
 
 @dataclass(frozen=True)
@@ -54,7 +65,7 @@ class Taken:
     @property
     def where(self) -> str:
         """As findings name it."""
-        return f"{self.common.loop}, {self.common.place}, {self.hz:.4g} Hz"
+        return f"{self.common.loop}, {self.common.at}, {self.hz:.4g} Hz"
 
 
 @dataclass(frozen=True)
@@ -84,7 +95,8 @@ def _common(recording: Recording[Plan], step: Step) -> Common:
         flags = data[limited.channel].astype(np.int64)
         share = float(np.mean(flags != 0 if limited.mask is None else flags & limited.mask != 0))
     states = tuple(names.get(int(code), str(int(code))) for code in np.unique(data[STATE]))
-    return Common(loop, str(step.labels["place"]), share, states, step.lost(), step.expected())
+    ring = bool(step.labels.get("ring", False))
+    return Common(loop, str(step.labels["place"]), share, states, step.lost(), step.expected(), ring)
 
 
 def read_taken(recording: Recording[Plan]) -> list[Taken]:

@@ -155,7 +155,9 @@ UNSTABLE_POLE = (
 )
 ACTUATOR_CONSTANT = (
     "What is moved is the mass, and what is turned the inertia, of the rig file: an error of either changes its constants by "
-    "its share, and K_over_J and the ratio not at all. Only a known ring on the shaft would show it.",
+    "its share, and K_over_J and the ratio not at all. With added_inertia a known ring on the shaft measures what turns.",
+    "Then the ring turns by its certificate, and nothing else is put on with it, such as screws: the inertia and the torque "
+    "constants change by the share that the ring's is off, 1 % by 1 %.",
     "An encoder's zero that is off by more than its tolerance takes its cosine: 10° electrical read 1.5 % less, in either "
     "sign. Set the zero first.",
     "Time is the controller's: a clock that is fast by 1e-4 changes constants by 2e-4.",

@@ -286,4 +286,4 @@ def test_refusals() -> None:
     bare = RIG.model_copy(update={"capabilities": RIG.capabilities.model_copy(update={"force_currents": {}})})
     assert procedure.lacking(bare) == ("capabilities: found no force_currents",)
     assert procedure.untold(RIG) == ()
-    assert len(MEASURES) == 6
+    assert len(MEASURES) == 7

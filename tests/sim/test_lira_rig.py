@@ -48,10 +48,11 @@ MOVES = {
         ("capacitor_derating_damper", "damper_c"))},
     "site.air_density": "", "machine.pole_pairs": "", "machine.pair_pitch": "", "rest_angle": "",
     **{f"u_s{k}.offset": "" for k in HALVES},
+    "machine.ring_inertia": "", "machine.ring_mass": "", "machine.ring_eccentricity": "",
     "geometry.hook_far": "", "geometry.hook_near": "", "masses.M1": "", "masses.M2": "", "mass_density": "",
 }  # fmt: skip
 """What moves which field of the plant: the air bears nothing, poles are counted, of the pitch it is the simulation's
-own number that counts, voltages have no offset, and masses and where they hang are
+own number that counts, voltages have no offset, and masses, where they hang, and the ring are
 what its operator goes by."""
 
 

@@ -21,6 +21,8 @@ def constants(done: Simulated) -> Found:
     lines = {ability(rig).loops[loop].channel: loop for loop in loops(rig, plan)}
     names = {line: {p.value: p.name for p in places(rig, plan, loop)} for line, loop in lines.items()}
     for (name, where, at), value in of(rig, done.drawn, {line: list(some) for line, some in names.items()}).items():
+        if name == "inertia" and not plan.added_inertia:
+            continue
         if where in lines:
             where = f"{lines[where]}, {names[where][at]}" if name.startswith("cogging") else lines[where]
         yield name, where, value

@@ -14,6 +14,7 @@ DEFECTS: Final = {
     "current_unfed": 0.0,
     "factor_ki_b": 1.0, "factor_ki_r": 1.0, "factor_ki_z": 1.0, "discharge_factor": 1.0,
     "mass_error_M1": 0.0, "mass_error_M2": 0.0, "places_exchanged": 0.0, "misplaced": 0.0,
+    "ring_missing": 0.0, "ring_other": 0.0, "ring_grip": 0.0,
 }  # fmt: skip
 """Planted defects and their harmless values. `coil_reversed`: number of the coil that is connected the other way round;
 `exchange_phases`: b and c of rotary actuator 1 or 2, or of both (3), exchanged at the terminals; `exchange_actuators`: 1, the
@@ -28,7 +29,9 @@ bits x1, x2, y1, y2 of the radial readings that the gate watches; `gate_lag_s`: 
 `current_unfed`: 1, currents are told without what is fed forward against cogging;
 `discharge_factor`: of the time that the DC link takes to discharge, 1e6 with an open bleeder;
 `mass_error_*`: share by which a mass is heavier than its certificate; `places_exchanged`: 1, whoever hangs masses takes one
-hook for the other; `misplaced`: number of the one hanging at which they do."""
+hook for the other; `misplaced`: number of the one hanging at which they do; `ring_missing`: 1, the ring is said to be on and
+is not; `ring_other`: share by which another one that is put on has more mass and moment of inertia; `ring_grip`: N m beyond
+which it slips on the mover, 0: it sits tight."""
 REVERSED: Final = (range(0), range(1, 7), range(7, 13), range(13, 16))
 """Coils of each actuator, by its number."""
 OPEN_OHM: Final = 5e3

@@ -23,6 +23,8 @@ typedef struct {
     double stop_z, stop_stiffness, stop_damping;
     double push[6];               /* N at the planes (x1, x2, y1, y2), N along z, N m: planted or hung */
     double hung, hung_at, hung_N; /* kg on the mover, m from its centre of mass towards plane 0, and what it weighs */
+    double part, part_at, part_N;  /* the same of a part that is put on and turns with it: a ring */
+    double part_inertia, part_off, part_phase, part_grip; /* kg m^2 about its own middle, m that this is off the axis, rad; N m it bears */
     double position_gain[6], position_offset[6], position_noise[6], position_lsb[6], filter_lag; /* x1 x2 y1 y2 z angle; s */
     double bridge_gain[15], bridge_offset[15], bridge_noise, bridge_lsb;   /* readings of i_f */
     double coil_gain[15], coil_offset[15], coil_noise, coil_lsb;           /* of i_s */
@@ -50,6 +52,7 @@ typedef struct {
 
 typedef struct {
     double q[6], v[6], a[6];                  /* x y alpha beta z angle */
+    double slip[3];                           /* of the part against the mover: rad, rad/s, rad/s^2 */
     double bridge[15], u[15], damper[15], coil[15]; /* i_f, u_s, u_d, i_s */
     double bridge_read[15], u_read[15], coil_read[15]; /* as the firmware has them */
     double sent[15], next[15];                /* u_sw now and from the next tick on */
@@ -111,6 +114,7 @@ void lira_step_stars(const lira_params *, lira_state *, const lira_place *);
 void lira_locate(const lira_params *, const lira_state *, lira_place *);
 void lira_rates(const lira_state *, lira_place *);
 void lira_accelerate(const lira_params *, lira_state *, const lira_place *, const double *dq);
+void lira_load(const lira_params *, lira_state *);
 void lira_sight(const lira_params *, lira_state *, double step_s, double keep);
 double lira_kept(const lira_params *, double step_s);
 void lira_positions(const lira_params *, const lira_control *, lira_state *);

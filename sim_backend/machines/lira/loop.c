@@ -36,12 +36,17 @@ static void true_currents(const lira_params *p, const lira_state *st, const lira
     split_all(coil, at->ra, at->la, dq);
 }
 
+/* a part that slips is caught where its slip turns round */
 static INLINE void kick(lira_state *st, double s) {
     for (int k = 0; k < 6; k++) st->v[k] += s * st->a[k];
+    double was = st->slip[1];
+    st->slip[1] += s * st->slip[2];
+    if (was * st->slip[1] < 0) st->slip[1] = 0;
 }
 
 static INLINE void drift(lira_state *st, double s) {
     for (int k = 0; k < 6; k++) st->q[k] += s * st->v[k];
+    st->slip[0] += s * st->slip[1];
 }
 
 /* dq currents, voltages, inductor currents as the firmware has them, readings, true places of the sensors, what acts */

@@ -68,19 +68,6 @@ static INLINE void magnets(const lira_params *p, const lira_state *st, const lir
     *y -= p->uneven[a] * t.s;
 }
 
-/* A mass on the mover's axis, h from its centre of mass, moves as x + h beta and y - h alpha, and pulls down there:
- *   [m + dm, +-dm h; +-dm h, J_t + dm h^2] a = what acts, + across, - upwards */
-static void loaded(const lira_params *p, lira_state *st) {
-    double m = p->mass + p->hung, couple = p->hung * p->hung_at, turn = p->transverse_inertia + couple * p->hung_at;
-    double across = p->mass * st->a[0], around = p->transverse_inertia * st->a[3], det = m * turn - couple * couple;
-    double up = p->mass * st->a[1] - p->hung_N, over = p->transverse_inertia * st->a[2] + p->hung_at * p->hung_N;
-    st->a[0] = (turn * across - couple * around) / det;
-    st->a[3] = (m * around - couple * across) / det;
-    st->a[1] = (turn * up + couple * over) / det;
-    st->a[2] = (m * over + couple * up) / det;
-    st->a[Z] *= p->mass / m;
-}
-
 /* accelerations by the place and the true dq currents R1 B1 R2 B2 L; `contact` is what the rings bear */
 void lira_accelerate(const lira_params *p, lira_state *st, const lira_place *at, const double *dq) {
     const double *q = st->q, *v = st->v;
@@ -106,12 +93,12 @@ void lira_accelerate(const lira_params *p, lira_state *st, const lira_place *at,
         torque += f.turn;
     }
     if (q[Z] < p->stop_z) along += -p->stop_stiffness * (q[Z] - p->stop_z) - p->stop_damping * v[Z];
-    double spin = -p->polar_inertia * v[ANGLE];
+    double spin = -(p->polar_inertia + p->part_inertia) * v[ANGLE];
     st->a[0] = sum_x / p->mass;
     st->a[1] = sum_y / p->mass - p->gravity;
     st->a[2] = (tilt_x + p->eccentric[1] * drive - spin * v[3]) / p->transverse_inertia;
     st->a[3] = (tilt_y - p->eccentric[0] * drive + spin * v[2]) / p->transverse_inertia;
     st->a[Z] = (drive + along) / p->mass;
     st->a[ANGLE] = torque / p->polar_inertia;
-    if (p->hung > 0) loaded(p, st);
+    if (p->hung > 0 || p->part > 0) lira_load(p, st);
 }

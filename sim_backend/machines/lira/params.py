@@ -69,6 +69,13 @@ class PlantParams:
     hung: float = 0.0  # kg
     hung_at: float = 0.0
     hung_N: float = 0.0
+    part: float = 0.0  # kg, of what is put on and turns with the mover
+    part_at: float = 0.0
+    part_N: float = 0.0
+    part_inertia: float = 0.0
+    part_off: float = 0.0
+    part_phase: float = 0.0
+    part_grip: float = math.inf  # N m
     position_gain: Each = (1.0,) * 6
     position_offset: Each = (0.0,) * 6
     position_noise: Each = (0.3e-6,) * 4 + (1e-6, 30e-6)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -172,6 +173,21 @@ class Plant:
         """A mass on the mover in place of what is on it: where, m from its centre of mass towards the first plane, and what it
         weighs there."""
         self._p.hung, self._p.hung_N, self._p.hung_at = kg, newtons, at
+
+    def mount(self, kg: float, newtons: float, inertia: float, *, at: float = 0.0, off: float = 0.0, phase: float = 0.0,
+              grip: float = math.inf) -> None:  # fmt: skip
+        """A ring on the mover in place of what is on it: its mass, weight and inertia about its own axis; where, m from the
+        mover's centre of mass towards the first plane; how far its middle is off the axis and in which phase, rad; the torque
+        from which on it slips, N m."""
+        p = self._p
+        p.part, p.part_N, p.part_inertia, p.part_at, p.part_off, p.part_phase, p.part_grip = (
+            kg, newtons, inertia, at, off, phase, grip)  # fmt: skip
+        self._s.slip[0:3] = [0.0, 0.0, 0.0]
+
+    @property
+    def slip(self) -> float:
+        """By what the ring has slipped since it was mounted, rad."""
+        return float(self._s.slip[0])
 
     @property
     def link_V(self) -> float:

@@ -39,6 +39,7 @@ def constants(rig: RigFile, drawn: Truth, places: Mapping[str, Sequence[float]])
     if AROUND in places:
         first, other = p.torque_constant
         out |= {("K_torque", name, 0.0): k for name, k in zip(ACTUATORS, (first, other), strict=True)}
+        out["inertia", AROUND, 0.0] = p.polar_inertia
         out["K_over_J", AROUND, 0.0] = (first + other) / p.polar_inertia
         out["K_ratio", "/".join(ACTUATORS), 0.0] = first / other
         out |= {("cogging_stiffness_angle", AROUND, x): around(p, x) for x in places[AROUND]}
