@@ -32,6 +32,7 @@ from bench.record.outcomes import Outcome
 from bench.run import stopped
 from bench.rundir import RunDirectory
 from bench.uncertainty import interval
+from procedures.amb_calibration.halves import DRIFTED
 from sim_backend.machine import Truth
 
 PROCEDURE, RIG, STEPS = "amb-calibration", "tsbs12", 60
@@ -119,8 +120,11 @@ def report(done: list[dict[str, Any]]) -> None:
         quiet = [max(abs(v["value"] - sound[d["seed"]]["values"][q]["value"]) / v["U"] for q, v in d["values"].items())
                  for d, c in zip(runs, caught, strict=True) if not c and d["values"]]  # fmt: skip
         codes = dict(Counter(c for d in runs for c, e in d["findings"] if e != Effect.NOTE))
-        print(f"{name} +{size:g}: caught {np.sum(caught)}/{len(runs)} {codes}, greatest quiet shift "
-              f"{max(quiet, default=0.0):.2f} U")  # fmt: skip
+        drifts = sum(any(code == DRIFTED for code, _ in d["findings"]) for d in runs)
+        moved = [abs(v["value"] - sound[d["seed"]]["values"][q]["value"]) / v["U"]
+                 for d in runs for q, v in d["values"].items() if q in sound[d["seed"]]["values"]]  # fmt: skip
+        print(f"{name} +{size:g}: caught {np.sum(caught)}/{len(runs)} {codes}, {DRIFTED} of any effect {drifts}, greatest "
+              f"shift {max(moved, default=0.0):.2f} U, quiet {max(quiet, default=0.0):.2f} U")  # fmt: skip
 
 
 def main() -> None:

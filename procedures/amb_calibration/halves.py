@@ -1,12 +1,16 @@
 """Drift between the halves of a calibration that was stopped and continued, by the hanging that is done in both.
 
 The same mass at the same angle asks for the same force. What the fit's terms make of the currents of both hangings, less what
-positions add, differs by d = r' - r; a hanging scatters (its strap seats anew, noise) by the covariance that the fit's
-residuals have, freed of a step between the halves, so that d has twice that variance. |d| beyond Student's t at CHANCE is a
-drift, told with its 95 % interval: of current or position sensors, of the magnets, or a hanger that hangs otherwise.
+positions add and what the shaft makes of it that stands some mrad beside where it stood (`stands`), differs by
 
-A shaft that was turned to its angle anew stands some mrad beside it, and sensors cool while the machine is off: what can be
-seen need not matter. A drift decides where K would move by
+    d = r' - r - s (theta' - theta)
+
+with the slope s of the force over the angle. A hanging scatters (its strap seats anew, noise) by the covariance that the fit's
+residuals have, freed of a step between the halves, so that d has twice that variance, and that of an angle by hand. |d| beyond
+Student's t at CHANCE and what a count of the encoder allows is a drift, told with its 95 % interval: of current or
+position sensors, of the magnets, or a hanger that hangs otherwise.
+
+Sensors cool while the machine is off: what can be seen need not matter. A drift decides where K would move by
 more than MATTERS of its own U: as a step of the force's zero, which moves K at an angle that the seam parts, or, with a mass
 on, as one of its scale, which moves K at every angle after it, whichever is more.
 """
@@ -24,6 +28,7 @@ from bench.recording import Recording
 from bench.recording.earlier import AGAIN, CONTINUED
 from bench.recording.steps import Step, Steps
 from bench.uncertainty.coverage import coverage_factor
+from procedures.amb_calibration import stands
 from procedures.amb_calibration.fit import Fit, Hangings, left_over, terms_of
 from procedures.amb_calibration.plan import Plan
 from procedures.amb_calibration.pulls import Pull, pulls
@@ -40,11 +45,13 @@ LOADED = 0.2  # of the load range: less says nothing of a scale
 @dataclass(frozen=True)
 class Difference:
     """A hanging that was done in both halves: its angle and its place among those there; `forces` (K,) N, second less first,
-    of each axis, their standard deviations `u` and degrees of freedom, and by how much K would move by such a drift, N/A."""
+    of each axis, freed of the shaft's other angle to `within` (K,) N, their standard deviations `u` and degrees of freedom,
+    and by how much K would move by such a drift, N/A."""
 
     angle: int
     place: int
     forces: Array
+    within: Array
     u: Array
     dof: float
     shifts: Array
@@ -84,9 +91,11 @@ def difference(
     changed = _with(h, at, again)
     moved = left_over(changed, f, p, plan.bias_A, count) - left_over(h, f, p, plan.bias_A, count)
     one, axes = _scatter(recording, data, f, p), range(len(f.terms))
-    u = np.sqrt([2 * one.covariance[(b, b, *at)] for b in axes])
-    d = moved[(slice(None), *at)]
-    return Difference(at[0], at[1], d, u, float(one.dof), _shifts(f, data.table.start_ns >= second.start_ns, at, d))
+    turned, slope = stands.turned(recording, first, second), stands.slopes(f, terms_of(h, p, plan.bias_A, count), *at)
+    u = np.sqrt([2 * one.covariance[(b, b, *at)] + (slope[b] * turned.u) ** 2 for b in axes])
+    d = moved[(slice(None), *at)] - slope * turned.rad
+    shifts = _shifts(f, data.table.start_ns >= second.start_ns, at, d)
+    return Difference(at[0], at[1], d, np.abs(slope) * turned.count, u, float(one.dof), shifts)
 
 
 def _shifts(f: Fit, after: npt.NDArray[np.bool_], at: tuple[int, int], d: Array) -> Array:
@@ -109,13 +118,13 @@ def _drifts(found: Difference, data: HangingData, f: Fit, expanded: Sequence[flo
         str(data.table.labels[found.angle * data.hangings.load.shape[1] + found.place]),
     )
     for b, axis in enumerate(f.pull.axes):
-        d, u = float(found.forces[b]), float(found.u[b])
-        if abs(d) <= limit * u:
+        d, u, within = float(found.forces[b]), float(found.u[b]), float(found.within[b])
+        if abs(d) <= limit * u + within:
             continue
         share, matters = abs(d) / float(np.ptp(f.forces[b])), found.shifts[b] > MATTERS * expanded[b]
         text = (
             f"the last hanging before the run was stopped ({what}), done again when it went on, asks the {axis.title} for "
-            f"{d:+.3f} N ± {k * u:.3f} N more ({share:.2%} of the load range), by which K would move by "
+            f"{d:+.3f} N ± {k * u + within:.3f} N more ({share:.2%} of the load range), by which K would move by "
             f"{found.shifts[b]:.2g} N/A (its U is {expanded[b]:.2g} N/A)"
         )
         if matters:
