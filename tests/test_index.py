@@ -22,6 +22,7 @@ from bench.record.outcomes import Outcome
 from bench.record.records import findings_of, measurement, missing, read_record, unfinished, write_record
 from bench.record.setup import Certified, Setup
 from bench.run import index
+from bench.run.indexstore import take_in
 from bench.uncertainty import Estimate, Influence
 
 
@@ -153,7 +154,7 @@ def test_an_index_that_cannot_be_written_answers_without_them(tmp_path: Path) ->
     run(tmp_path, 2)
     read_only = f"file:{tmp_path / index.NAME}?mode=ro"
     with closing(sqlite3.connect(read_only, uri=True)) as db:
-        index._take_in(db, tmp_path)
+        take_in(db, tmp_path)
         assert db.execute("SELECT count(*) FROM runs").fetchone() == (1,)
     assert outcomes(tmp_path) == ["PASS", "PASS"]
 

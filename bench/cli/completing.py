@@ -51,9 +51,9 @@ def kinds() -> Iterable[str]:
 
 def quantities() -> Iterable[str]:
     """Measured in ./runs; none where a key cannot have them: nothing is told in the middle of a line."""
-    from bench.run import index
+    from bench.run import index, indexstore
 
-    logging.getLogger(index.__name__).setLevel(logging.ERROR)
+    logging.getLogger(indexstore.__name__).setLevel(logging.ERROR)
     with suppress(sqlite3.Error, OSError):
         return index.names(Path("runs"))
     return ()

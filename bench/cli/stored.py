@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from bench.cli.options import Calibrations, Machine, Out, ProcedureFile, RunArgument, Table, Verbose
+from bench.run.indexrow import MachineKind
 
 
 def adopt(
@@ -58,6 +59,11 @@ def report(run: RunArgument, procedure: ProcedureFile = "") -> int:
     return report_command(ended(run), procedure)
 
 
+def kind_of(machine: Machine | None) -> MachineKind | None:
+    """An option's word as the index has it."""
+    return None if machine is None else machine.value
+
+
 def runs(
     out: Out = Path("runs"),
     procedure: Annotated[
@@ -75,9 +81,7 @@ def runs(
     """List the runs with their outcomes, oldest first."""
     from bench.cli.runs import RunsRequest, runs_command
 
-    return runs_command(
-        RunsRequest(out, procedure, rig, failed, last, tuple(show or ()), as_json, machine and machine.value)
-    )
+    return runs_command(RunsRequest(out, procedure, rig, failed, last, tuple(show or ()), as_json, kind_of(machine)))
 
 
 def show(
@@ -141,7 +145,7 @@ def trend(
     from bench.cli.trend import TrendRequest, trend_command
 
     asked = TrendRequest(quantity=quantity, out=out, rig=rig, procedure=procedure, seed=seed, last=last, weight=weight,
-                         baseline=baseline, json=json, figure=figure, machine=machine and machine.value)  # fmt: skip
+                         baseline=baseline, json=json, figure=figure, machine=kind_of(machine))  # fmt: skip
     return trend_command(asked)
 
 

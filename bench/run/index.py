@@ -3,43 +3,24 @@ rebuilt. What only reads it imports nothing heavy: `bench.run.indexed` reads the
 
 from __future__ import annotations
 
-import gc
 import json
-import logging
 import os
 import sqlite3
-import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import closing, contextmanager, suppress
+from collections.abc import Callable, Sequence
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
 from typing import Any, TypeVar
 
-from bench.errors import ConfigError
-from bench.run.indexrow import (
-    CALLED,
-    KIND,
-    MADE,
-    RUN_COLUMNS,
-    TABLES,
-    IndexEntry,
-    Kind,
-    MachineKind,
-    Numbers,
-    Result,
-    Row,
-)
-from bench.rundir import RunDirectory, named_as_run, runs_in
+from bench.run.indexrow import KIND, RUN_COLUMNS, IndexEntry, Kind, MachineKind, Numbers, Result
+from bench.run.indexstore import NAME, VERSION, answered, put, rebuild, take_in, uncollected
+from bench.rundir import RunDirectory
 
-NAME = "index.sqlite"
-VERSION = 6  # of the tables; another one is rebuilt
+__all__ = ["NAME", "SOUND", "VERSION", "IndexEntry", "MachineKind", "Result", "add", "entries", "listing", "machines", "names",
+           "numbers", "rebuild", "results", "uncollected"]  # fmt: skip
 SOUND = ("PASS", "DONE")
-TICK_NS = 1_000_000_000  # two changes of a folder that are nearer may have one time
-LISTED_NS = 10_000_000_000  # so much older an index is made that knows all of its folder: nothing else makes it so
 T = TypeVar("T")
-log = logging.getLogger(__name__)
 OF_MACHINE: dict[MachineKind, str] = {
     "real": "seed IS NULL AND NOT served",
     "served": "seed IS NULL AND served",
@@ -58,18 +39,7 @@ def add(run_dir: Path) -> None:
     from bench.run.indexed import row
 
     found = row(RunDirectory(run_dir.resolve()))
-    _answered(run_dir.resolve().parent, lambda db: _put(db, found))
-
-
-def rebuild(root: Path) -> list[str]:
-    """Make the index anew from the records; what cannot be read is left out and named in the messages returned."""
-    try:
-        return _filled(root)
-    except sqlite3.OperationalError:
-        raise  # locked or not writable: deleting it would not help
-    except sqlite3.DatabaseError:
-        (root / NAME).unlink(missing_ok=True)
-        return _filled(root)
+    answered(run_dir.resolve().parent, lambda db: put(db, found))
 
 
 def entries(
@@ -151,7 +121,7 @@ def numbers(root: Path, quantity: str) -> list[Numbers]:
         return [Numbers(run, *called[number], *rest) for run, number, *rest in db.execute(query)]
 
     with uncollected():
-        return _answered(root, asked) if root.is_dir() else []
+        return answered(root, asked) if root.is_dir() else []
 
 
 def machines(root: Path, quantity: str, procedure: str | None = None, rig: str | None = None) -> Counter[MachineKind]:
@@ -167,7 +137,7 @@ def machines(root: Path, quantity: str, procedure: str | None = None, rig: str |
                 found.update({of[kind]: runs} if kind in of else {})
         return found
 
-    return _answered(root, asked) if root.is_dir() else found
+    return answered(root, asked) if root.is_dir() else found
 
 
 def names(root: Path) -> list[str]:
@@ -228,131 +198,7 @@ def _read(root: Path, ask: Callable[[sqlite3.Connection], T]) -> T:
     """As `_answered`, of all runs that are there: also of those that nobody put in."""
 
     def asked(db: sqlite3.Connection) -> T:
-        _take_in(db, root)
+        take_in(db, root)
         return ask(db)
 
-    return _answered(root, asked)
-
-
-def _take_in(db: sqlite3.Connection, root: Path) -> None:
-    """Put in the runs of processes that were killed, and those that were copied here. The folder is listed where something was
-    made in it, or taken away, since it was listed last: the time of the index's file tells."""
-    own, changed_ns = root / NAME, root.stat().st_mtime_ns
-    if own.stat().st_mtime_ns == changed_ns - LISTED_NS:
-        return
-    known = {run_id for (run_id,) in db.execute("SELECT run_id FROM runs")}
-    new = sorted(name for name in set(os.listdir(root)) - known if named_as_run(name))
-    messages: list[str] = []
-    if new:
-        try:
-            db.execute("BEGIN IMMEDIATE")  # a run that ends meanwhile puts itself in afterwards, in place of this
-            rows = list(_ended(new, root, messages))
-            for row in rows:
-                _put(db, row)
-            db.commit()
-        except (
-            sqlite3.OperationalError
-        ) as error:  # a folder of somebody else's, or one in which somebody writes for long
-            db.rollback()
-            log.warning(f"{own}: {len(new)} runs are left out of the index: {error}")
-            return
-        for message in messages:
-            log.warning(message)
-        if len(rows) + len(messages) < len(new):
-            return  # one that goes on may be killed, and nothing in the folder would change
-    if time.time_ns() - changed_ns > TICK_NS:
-        with suppress(OSError):
-            os.utime(own, ns=(changed_ns, changed_ns - LISTED_NS))
-
-
-def _ended(names: Iterable[str], root: Path, messages: list[str]) -> Iterator[Row]:
-    """What the index keeps of runs, without those that are being written; those that cannot be read are named in `messages`."""
-    from bench.lock import is_held
-    from bench.run.indexed import row
-
-    for name in names:
-        run = RunDirectory(root / name)
-        try:
-            found = row(run)
-        except ConfigError as error:
-            messages.append(f"{run.path}: left out of the index: {error}")
-            continue
-        if found.entry.ended is None:
-            with suppress(OSError):  # no recording: it was killed before it began
-                if is_held(run.recording):
-                    continue
-        yield found
-
-
-def _answered(root: Path, ask: Callable[[sqlite3.Connection], T]) -> T:
-    """What the index answers. One that is missing, of another version or corrupt is rebuilt first: that shows where it is read,
-    as a check of the whole would take longer than any answer."""
-    for _ in range(2):
-        try:
-            with _opened(root) as db:
-                if db.execute("PRAGMA user_version").fetchone()[0] == VERSION:
-                    return ask(db)
-        except sqlite3.OperationalError as error:
-            if "no such" not in str(error):  # a table or column: it was made otherwise
-                raise
-        except sqlite3.DatabaseError:
-            pass
-        rebuild(root)
-    with _opened(root) as db:
-        return ask(db)
-
-
-def _filled(root: Path) -> list[str]:
-    messages: list[str] = []
-    with _opened(root) as db:
-        db.execute("BEGIN IMMEDIATE")  # before the records are read: another process adds before or after, not between
-        for table in ("runs", "kinds", "made_with", "names", "results"):
-            db.execute(f"DROP TABLE IF EXISTS {table}")
-        for statement in filter(str.strip, TABLES.split(";")):
-            db.execute(statement)
-        for found in _ended((run.run_id for run in runs_in(root)), root, messages):
-            _put(db, found)
-        db.execute(f"PRAGMA user_version = {VERSION}")
-    for message in messages:
-        log.warning(message)
-    return messages
-
-
-def _put(db: sqlite3.Connection, row: Row) -> None:
-    """A run and its results, in place of what stood there of that run."""
-    for (run,) in db.execute("SELECT run FROM runs WHERE run_id = ?", row.entry[:1]).fetchall():
-        db.execute("DELETE FROM results WHERE run = ?", (run,))
-        db.execute("DELETE FROM runs WHERE run = ?", (run,))
-    e = row.entry
-    kept = (_kept(db, "kinds", "kind", KIND, e.kind), _kept(db, "made_with", "made", MADE, row.made_with))
-    of_run = (None, e.run_id, e.started, e.ended, *kept)
-    run = db.execute(f"INSERT INTO runs VALUES ({', '.join('?' * len(of_run))})", of_run).lastrowid
-    for ordinal, (called, numbers) in enumerate(row.results):
-        number = _kept(db, "names", "number", CALLED, called)
-        db.execute("INSERT INTO results VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", (number, run, ordinal, *numbers))
-
-
-def _kept(db: sqlite3.Connection, table: str, key: str, columns: str, shared: tuple[str | int | None, ...]) -> int:
-    """The number of what many rows share, which a table has once."""
-    alike = " AND ".join(f"{column} IS ?" for column in columns.split(", "))
-    known = db.execute(f"SELECT {key} FROM {table} WHERE {alike}", shared).fetchone()
-    places = ", ".join("?" * len(shared))
-    return int(known[0] if known else db.execute(f"INSERT INTO {table} VALUES (NULL, {places})", shared).lastrowid or 0)
-
-
-@contextmanager
-def uncollected() -> Iterator[None]:
-    """Rows are tuples of numbers and texts: to look among very many of them for circles takes longer than to read them."""
-    enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if enabled:
-            gc.enable()
-
-
-@contextmanager
-def _opened(root: Path) -> Iterator[sqlite3.Connection]:
-    with closing(sqlite3.connect(root / NAME, timeout=30.0)) as db, db:
-        yield db
+    return answered(root, asked)

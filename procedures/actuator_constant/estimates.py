@@ -77,7 +77,7 @@ def _result(loop: str, taken: Sequence[Taken], added: Sequence[Added], rig: RigF
         _, alike = _seen(there, shares, rig)
         ratio = _read_ratio(added, driving, alike.slope, loop)
         shares = {driving[0]: ratio.value / (1 + ratio.value), driving[1]: 1 / (1 + ratio.value)}
-    looked, ringed = [], []
+    looked, ringed = list[Looked](), list[Looked]()
     for ring, into in ((False, looked), (True, ringed))[: 1 + (loop in with_the_ring(rig, plan))]:
         for place in places(rig, plan, loop):
             there = _there(taken, loop, place.name, ring)
