@@ -164,8 +164,8 @@ def _signal(g: Signal, s: Segment, t: Told, weight: float) -> str:
     if watched > CHANCES:
         return shown + began
     left = no_signal(repeat(0.0, watched), 1.0 if g.chart == "individuals" else weight, baseline)[-1]
-    by_chance = f"Of machines that do not change {100 * (1 - left):.0f} % show one in this chart by now"
-    return f"{shown}{began}. {by_chance}, with limits from {baseline} runs"
+    share = f"Of machines that do not change {100 * (1 - left):.0f} %"
+    return f"{shown}{began}. {share} show one in this chart by now, with limits from {baseline} runs"
 
 
 def _drift(s: Segment, t: Told) -> Iterator[str]:
