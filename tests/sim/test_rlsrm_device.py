@@ -11,8 +11,8 @@ import pytest
 from rlsrm_host import RIG, Host
 
 from sim_backend.machines.rlsrm.device import SETTABLE, control_of
-from sim_backend.machines.rlsrm.params import DEG, ControlParams
-from sim_backend.machines.rlsrm.plant import slopes
+from sim_backend.machines.rlsrm.params import DEG, ControlParams, PlantParams
+from sim_backend.machines.rlsrm.plant import Plant, slopes
 
 PULSE = ("i_a1", "u_a1", "i_b1")
 FAULT_NAMES = RIG.messages["Telemetry"].signal("fault").choices
@@ -31,6 +31,18 @@ def test_a_controller_is_what_its_parameters_make_it() -> None:
     )
     assert (other.kp[0], other.speed[1], other.rule) == (1.0, 2.0, 1.0)
     assert (other.map.gain[5], other.map.zero[1], other.map.slope) == (1.1, 0.01, 0.8)
+    assert control_of({"current_zero_6": 0.02}).current_zero == (0.0,) * 5 + (0.02,)
+
+
+def test_a_loop_takes_off_what_its_sensor_is_told_to_read_without_a_current() -> None:
+    """A sensor that reads 20 mA too much makes 1.98 A of 2 A; with its zero told it makes 2 A, and the others what they made.
+    None of it where no current is wanted."""
+    plant = Plant(PlantParams(locked=(1.0, 1.0), current_offset=(0.02,) * 6))
+    plant.switch(on=True)
+    plant.zero(1, 0.02)
+    plant.drive(np.array([2.0, 2.0, 0.0, 0.0, 0.0, 0.0]))
+    plant.run(0.05, 0)
+    assert plant.currents == pytest.approx([1.98, 2.0, 0.0, 0.0, 0.0, 0.0], abs=1e-4)
 
 
 def test_commands_lead_from_state_to_state() -> None:
