@@ -35,8 +35,8 @@ def test_a_controller_is_what_its_parameters_make_it() -> None:
 
 
 def test_a_loop_takes_off_what_its_sensor_is_told_to_read_without_a_current() -> None:
-    """A sensor that reads 20 mA too much makes 1.98 A of 2 A; with its zero told it makes 2 A, and the other amplifiers what they
-    made. None of it where no current is wanted."""
+    """A sensor that reads 20 mA too much makes 1.98 A of 2 A; with its zero told it makes 2 A, and the others what they made.
+    None of it where no current is wanted."""
     plant = Plant(PlantParams(locked=(1.0, 1.0), current_offset=(0.02,) * 6))
     plant.switch(on=True)
     plant.zero(1, 0.02)
