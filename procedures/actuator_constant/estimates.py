@@ -77,7 +77,8 @@ def _result(loop: str, taken: Sequence[Taken], added: Sequence[Added], rig: RigF
         _, alike = _seen(there, shares, rig)
         ratio = _read_ratio(added, driving, alike.slope, loop)
         shares = {driving[0]: ratio.value / (1 + ratio.value), driving[1]: 1 / (1 + ratio.value)}
-    looked, ringed = list[Looked](), list[Looked]()
+    looked: list[Looked] = []
+    ringed: list[Looked] = []
     for ring, into in ((False, looked), (True, ringed))[: 1 + (loop in with_the_ring(rig, plan))]:
         for place in places(rig, plan, loop):
             there = _there(taken, loop, place.name, ring)
@@ -89,8 +90,10 @@ def _result(loop: str, taken: Sequence[Taken], added: Sequence[Added], rig: RigF
 
 
 def _there(taken: Sequence[Taken], loop: str, place: str, ring: bool = False) -> list[Taken]:
-    """Raises:
-    AnalysisError: there is none.
+    """The sines of a place, with the ring or without it.
+
+    Raises:
+        AnalysisError: there is none.
     """
     some = [t for t in taken if (t.common.loop, t.common.place, t.common.ring) == (loop, place, ring)]
     if not some:

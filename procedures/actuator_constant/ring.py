@@ -51,7 +51,9 @@ def inertias(
     for without, beside in zip(bare, ringed, strict=True):
         p, q = (sum(of.values(), Estimate.exact(0.0)) for of in (without, beside))
         if not (p.value - q.value) > LEAST * p.value:
-            raise NotSeen(f"K over what turns is {q.value / p.value - 1:+.1%} with the ring on: was it mounted?")
+            raise NotSeen(
+                f"K over what turns is {q.value / p.value - 1:+.1%} with the ring on: was it mounted, does it sit tight?"
+            )
         j = ring * (q / (p - q))
         out.append(Estimate(j.value, "kg m^2", j.sensitivities))
     return out
