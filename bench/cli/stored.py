@@ -73,7 +73,9 @@ def runs(
     from bench.cli.runs import RunsRequest, runs_command
 
     return runs_command(
-        RunsRequest(out, procedure, rig, failed, last, tuple(show or ()), as_json, machine and machine.value)
+        RunsRequest(
+            out, procedure, rig, failed, last, tuple(show or ()), as_json, None if machine is None else machine.value
+        )
     )
 
 
@@ -137,8 +139,10 @@ def trend(
     """Follow a quantity over the runs of a folder: control charts, drift, and when its limit is near."""
     from bench.cli.trend import TrendRequest, trend_command
 
-    asked = TrendRequest(quantity=quantity, out=out, rig=rig, procedure=procedure, seed=seed, last=last, weight=weight,
-                         baseline=baseline, json=json, figure=figure, machine=machine and machine.value)  # fmt: skip
+    asked = TrendRequest(
+        quantity=quantity, out=out, rig=rig, procedure=procedure, seed=seed, last=last, weight=weight, baseline=baseline,
+        json=json, figure=figure, machine=None if machine is None else machine.value,
+    )  # fmt: skip
     return trend_command(asked)
 
 

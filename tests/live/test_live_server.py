@@ -264,7 +264,9 @@ def test_one_page_too_many_is_turned_away_and_finds_a_place_later(made: MadeRun,
 
 
 def test_a_port_in_use_and_an_address_of_somebody_else_are_said_with_what_to_do(made: MadeRun) -> None:
-    with pytest.raises(ConfigError, match=rf"--live-port {made.server.port}: found it in use .* Next: "):
+    with pytest.raises(
+        ConfigError, match=rf"--live-port {made.server.port}: found it in use .* Next: .* or leave --live-port out"
+    ):
         MadeRun(made.server.port)
     with pytest.raises(ConfigError, match=r"--live-bind 192\.0\.2\.1: found no such address on this host; expected"):
         MadeRun(address="192.0.2.1")
