@@ -36,9 +36,15 @@ links: setup
 
 # The live page in Chromium, which has to be installed (Debian: apt-get install chromium), or CHROMIUM=/path/to/it.
 # Pictures of every state to look at lie under build/browser then.
+# WHEEL=dist/levbench-*.whl: of what that wheel installs into an environment of its own, and nothing of this clone.
+BROWSED := build/browser-environment
 browser: setup
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check "playwright>=1.55"
-	$(BIN)/python -m pytest -q -m browser tests/browser
+ifdef WHEEL
+	$(BIN)/python -m venv --clear --without-pip $(BROWSED)
+	$(BIN)/python -m pip --quiet --disable-pip-version-check --python $(BROWSED)/bin/python install --no-index --no-deps $(wildcard $(WHEEL))
+endif
+	$(if $(WHEEL),INSTALLED=$(BROWSED)) $(BIN)/python -m pytest -q -m browser tests/browser
 
 # The README's pictures anew, by the same tests.
 pictures: setup

@@ -1,4 +1,8 @@
-"""A run with its live page, in simulation or on a served rig, as processes of their own."""
+"""A run with its live page, in simulation or on a served rig, or the page of a folder of runs, as processes of their own.
+
+They are this clone's, or with INSTALLED those of an environment that Levbench's wheel was installed into; what it depends on
+comes from that of the tests.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +18,9 @@ from pathlib import Path
 from typing import IO, Any
 
 ROOT = Path(__file__).resolve().parents[2]
-BENCH = [sys.executable, "-m", "bench.cli"]
+INSTALLED = Path(os.environ["INSTALLED"]).absolute() if os.environ.get("INSTALLED") else None
+PYTHON = str(INSTALLED / "bin" / "python") if INSTALLED else sys.executable
+BENCH = [str(INSTALLED / "bin" / "bench")] if INSTALLED else [PYTHON, "-m", "bench.cli"]
 PORTS = ("controller=slcan:socket://127.0.0.1:0", "fieldbus=modbus-tcp:127.0.0.1:0", "operator=line:127.0.0.1:0")
 END_S = 60
 
@@ -49,7 +55,37 @@ class Run:
 
 
 def _environment() -> dict[str, str]:
-    return {**os.environ, "PYTHONPATH": str(ROOT)}
+    dependencies = [path for path in sys.path if Path(path).name == "site-packages"]
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(dependencies) if INSTALLED else str(ROOT)}
+
+
+def owned_by() -> Path:
+    """Where the package `bench` lies that the processes of these tests run."""
+    said = subprocess.run([PYTHON, "-c", "import bench; print(bench.__path__[0])"], cwd="/", env=_environment(), text=True,
+                          capture_output=True, check=True)  # fmt: skip
+    return Path(said.stdout.strip())
+
+
+def finished(out: Path, *words: str) -> Path:
+    """The folder of a run without a page, which is over."""
+    done = subprocess.run([*BENCH, "run", *words, "--out", str(out)], cwd=out, env=_environment(), text=True,
+                          capture_output=True, check=False)  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return Path(done.stdout.splitlines()[-1])
+
+
+@contextmanager
+def shown(folder: Path) -> Iterator[str]:
+    """The address of `bench show` on a folder."""
+    command = [*BENCH, "show", str(folder)]
+    with subprocess.Popen(command, cwd=folder, env=_environment(), text=True, stderr=subprocess.PIPE) as process:
+        try:
+            assert process.stderr is not None
+            found = re.search(r"page: (http\S+)", process.stderr.readline())
+            assert found is not None
+            yield found[1]
+        finally:
+            process.terminate()
 
 
 @contextmanager
@@ -73,7 +109,7 @@ def served(rig: str, links: Sequence[str] = PORTS) -> Iterator[list[str]]:
     """The words that connect a run to a rig that is served in real time."""
     command = [*BENCH, "serve", rig, *(word for link in links for word in ("--link", link))]
     with subprocess.Popen(
-        command, env=_environment(), text=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+        command, cwd="/", env=_environment(), text=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
     ) as process:
         try:
             assert process.stdout is not None

@@ -11,12 +11,12 @@ import threading
 import time
 from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from pathlib import Path
 from typing import Any
 
+from real import owned_by
 from shaft import MICRON, hello, samples
 
-PAGE = Path(__file__).resolve().parents[2] / "bench" / "live" / "page"
+PAGE = owned_by() / "live" / "page"
 TOKEN = "a-token-of-the-tests"
 CSP = "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'self'"
 

@@ -6,6 +6,7 @@ import fcntl
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import pytest
 import real
@@ -87,3 +88,5 @@ def test_a_simulated_run_to_its_report(tmp_path: Path, opened: Open, expect: Any
     assert len(rows) == len([m for m in record["measurements"] if m["value"] is not None])
     assert any(row[-4] in report for row in rows)  # the same digits as on page 1
     assert found.wrong == []
+    asked = [urlsplit(url) for url in found.asked]
+    assert {url.netloc for url in asked if url.scheme != "blob"} == {urlsplit(run.address).netloc}
