@@ -62,10 +62,9 @@ def _ability(rig: RigFile, procedure: Procedure) -> Ability:
     lacking = procedure.lacking(rig)
     problems: list[Problem] = []
     plan: BenchPlan | None = None
-    defaults = f"{rig.path} [plans.{procedure.name}]"
     try:
         if not lacking or procedure.name in rig.plans:
-            plan = assemble(procedure.plan, (defaults, rig.plans.get(procedure.name, {})))
+            plan = assemble(procedure.plan, procedure.defaults(rig))
     except ConfigError as error:
         problems += error.problems or (Problem(rig.path, f"plans.{procedure.name}", str(error), "a plan"),)
     try:

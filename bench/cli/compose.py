@@ -59,9 +59,8 @@ def planned(request: Request, earlier: Earlier | None = None) -> tuple[Procedure
     procedure = procedure.on(rig)
     if lacking := procedure.lacking(rig):
         raise ConfigError("\n  ".join([f"{rig.name} cannot run {procedure.name}; nothing was started:", *lacking]))
-    defaults = (f"{rig.path} [plans.{procedure.name}]", rig.plans.get(procedure.name, {}))
     if earlier is None or request.plan or request.plan_file is not None:
-        plan = plans.assemble(procedure.plan, defaults, request.plan_file, request.plan)
+        plan = plans.assemble(procedure.plan, procedure.defaults(rig), request.plan_file, request.plan)
     else:
         plan = earlier.recording.plan_as(procedure.plan)
     if earlier is not None:

@@ -122,7 +122,7 @@ def flown(
         ConfigError: a calibration that is needed is not given, was made at other settings, or rules the plan out.
     """
     chosen, file = load_procedure(procedure), load_rig(rig)
-    settings = chosen.plan.model_validate({**file.plans.get(procedure, {}), **plan})
+    settings = chosen.plan.model_validate({**chosen.defaults(file)[1], **plan})
     used = given(chosen.needs(settings), calibrations or {})
     chosen.refuse_by(file, settings, used)
     stretch, start_ns = (0, None) if earlier is None else (earlier.stretch, switched_on_ns(earlier))

@@ -52,6 +52,10 @@ def _levitation(_: RigFile) -> Requires:
     return Requires()
 
 
+def _as_by_default(_: RigFile) -> Mapping[str, Any]:
+    return {}
+
+
 def _no_settings(_rig: RigFile, _plan: Any) -> Mapping[str, float]:
     return {}
 
@@ -95,6 +99,8 @@ class Procedure:
     controller, SI, that the runner writes in READY, before it levitates. `optional` of the measures are those that a sound
     machine may lack: not missing where no limit asks; `untold` are those that a rig cannot show, whatever its state.
     `left_out` are those that a plan does not measure: none of them is missing, and a limit for one judges nothing.
+    `planned` are settings of a plan as they are on a rig by default, where those of the plan itself do not fit every rig: its
+    masses, its speeds; the rig file and who asks say otherwise.
     `step_count` is how many steps `acquire` will record, for the progress display; 0 is unknown. `fewest_steps` is how many
     a run that goes to its end has at least, where these are fewer; `former_steps` how many one of plan schema 1 has, where
     it had fewer; `steps_on` is `step_count` where that depends on the rig.
@@ -132,6 +138,7 @@ class Procedure:
     figures: Callable[[Any, Recording[Any]], Iterable[Shown]] = field(default=_no_figures)
     requires: Callable[[RigFile], Requires] = field(default=_levitation)
     check: Callable[[RigFile, Any], Iterable[str]] = field(default=_no_problems)
+    planned: Callable[[RigFile], Mapping[str, Any]] = field(default=_as_by_default)
     settings: Callable[[RigFile, Any], Mapping[str, float]] = field(default=_no_settings)
     step_count: Callable[[Any], int] = field(default=_unknown_count)
     fewest_steps: Callable[[Any], int] | None = None
@@ -156,6 +163,10 @@ class Procedure:
         """Raises Unfit if the plan cannot work by what is known of the rig; `calibrations` are those that it needs."""
         if problems := tuple(self.foresees(rig, plan, {c.procedure: c for c in calibrations})):
             raise Unfit(problems)
+
+    def defaults(self, rig: RigFile) -> tuple[str, Mapping[str, Any]]:
+        """The settings of a plan that a rig brings along, for `plans.assemble`: where they stand, and what they are."""
+        return f"{rig.path} [plans.{self.name}]", {**self.planned(rig), **rig.plans.get(self.name, {})}
 
     def steps(self, rig: RigFile, plan: Any) -> int:
         """How many steps `acquire` will record on a rig; 0 is unknown."""

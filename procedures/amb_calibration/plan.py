@@ -6,13 +6,14 @@ from pydantic import Field
 
 from bench.procedure import BenchPlan
 
+FEWEST_MASSES = 4
 ROUNDS_AT_ONE = 3  # so that the scatter of a hanging has 20 degrees of freedom
 
 
 class Plan(BenchPlan):
     """Settings of the calibration, SI."""
 
-    masses: tuple[str, ...] = Field(("M1", "M2", "M3", "M4"), min_length=4)  # labels of the rig's masses, ascending
+    masses: tuple[str, ...] = Field(("M1", "M2", "M3", "M4"), min_length=FEWEST_MASSES)  # of the rig's, ascending
     angles: int = Field(8, ge=1)  # equally spaced over a turn, 8 or more; 1: as the shaft stands
     rounds: int | None = Field(None, ge=1)  # of all masses at each angle; None: 1, and 3 at one angle alone
     bias_A: float = Field(3.0, gt=0)

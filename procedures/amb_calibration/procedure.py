@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -32,12 +33,13 @@ from procedures.amb_calibration.fit import Fit
 from procedures.amb_calibration.hanging import exercised, hung_up_and_down, sequence
 from procedures.amb_calibration.hypotheses import Contradiction
 from procedures.amb_calibration.inputs import fit_inputs, hand_rad
-from procedures.amb_calibration.plan import Plan
+from procedures.amb_calibration.plan import FEWEST_MASSES, Plan
 from procedures.amb_calibration.pulls import Loaded, Pull, pulls
 from procedures.amb_calibration.scatter import Scatter, covariance_by_angle, covariance_over_a_turn, outputs, scatter
 from procedures.amb_calibration.steps import Hang, HangingData, channels, hung, read_hangings
 from procedures.servomotor.loads import check_masses
 from procedures.shared import assumptions
+from procedures.shared.default_masses import by_weight
 from procedures.shared.weight import weight
 
 K = Quantity("K", "N/A", "dF/di of a bearing's axis at zero control current, mean over a turn")
@@ -194,8 +196,17 @@ def masses_u(recording: Recording[Plan]) -> np.ndarray:
                      *(rig.masses[m].standard_uncertainty for m in recording.plan.masses)])  # fmt: skip
 
 
+def planned(rig: RigFile) -> Mapping[str, Any]:
+    """All the masses that the rig has and may bear; the plan's own names where they are too few, which `check` says."""
+    labels = by_weight(rig)
+    return {"masses": labels} if len(labels) >= FEWEST_MASSES else {}
+
+
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
+    if len(rig.masses) < FEWEST_MASSES:
+        yield f"masses: found {', '.join(rig.masses)}; expected {FEWEST_MASSES} or more, each heavier than the one before"
+        return
     yield from check_masses(rig, plan.masses)
     if 1 < plan.angles < turns.FEWEST:
         yield (f"angles: found {plan.angles}; expected {turns.FEWEST} or more, for a mean over a turn, or 1 for a shaft that "
@@ -231,6 +242,7 @@ procedure = Procedure(
     measures=MEASURES,
     state=RigState.LEVITATED,
     plan=Plan,
+    planned=planned,
     acquire=acquire,
     evaluate=evaluate,
     measured=measured,

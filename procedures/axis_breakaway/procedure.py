@@ -27,6 +27,7 @@ from procedures.axis_breakaway.sequence import INTEGRATORS, RADIUS, chosen, heli
 from procedures.axis_breakaway.sequence import step_count as counted
 from procedures.axis_breakaway.steps import STATE, read_ramps
 from procedures.shared import assumptions
+from procedures.shared.default_masses import nth_lightest
 
 STICKS = "force at which it begins to move, raised slowly, mean of both ways"
 MEASURES = (
@@ -125,6 +126,7 @@ procedure = Procedure(
     measures=MEASURES,
     state=RigState.HELD,
     plan=Plan,
+    planned=lambda rig: nth_lightest(rig, mass=1, lever_mass=0),
     acquire=acquire,
     evaluate=evaluate,
     measured=measured,

@@ -40,6 +40,7 @@ from procedures.axis_friction.sequence import (
 from procedures.axis_friction.sequence import step_count as counted
 from procedures.axis_friction.steps import STATE, read_passes
 from procedures.shared import assumptions
+from procedures.shared.default_masses import nth_lightest
 
 DRY = "friction at no speed, by a line over constant rates, mean of both ways"
 WET = "slope of friction over the rate, mean of both ways"
@@ -142,6 +143,7 @@ procedure = Procedure(
     measures=MEASURES,
     state=RigState.HELD,
     plan=Plan,
+    planned=lambda rig: nth_lightest(rig, mass=1, lever_mass=0),
     acquire=acquire,
     evaluate=evaluate,
     measured=measured,

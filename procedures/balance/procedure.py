@@ -6,7 +6,8 @@ permissible residual unbalance; influence coefficients.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
 
 from bench.figures import Shown
 from bench.findings import Effect, Ended, Finding, Findings
@@ -28,6 +29,7 @@ from procedures.balance.steps import BASE, known_by, read_runs
 from procedures.shared import assumptions, first_look
 from procedures.synchronous import bearings, dwelling
 from procedures.synchronous import checks as dwell_checks
+from procedures.synchronous.default_speeds import within_envelope
 from procedures.synchronous.dwells import SLOW
 from procedures.synchronous.hum import listen
 
@@ -157,12 +159,18 @@ def figures(result: Result, recording: Recording[Plan]) -> Iterable[Shown]:
     return drawn.all_figures(result)
 
 
+def planned(rig: RigFile) -> Mapping[str, Any]:
+    """Speeds that the envelope allows; the highest service speed is another matter than those of the runs."""
+    return {**within_envelope(rig, Plan, "speeds_rad_s"), **within_envelope(rig, Plan, "service_rad_s")}
+
+
 procedure = Procedure(
     name="balance",
     title="Two-plane balancing by influence coefficients",
     measures=MEASURES,
     state=RigState.READY,
     plan=Plan,
+    planned=planned,
     acquire=sequence.acquire,
     evaluate=evaluate,
     measured=measured,

@@ -14,6 +14,7 @@ from procedures.coast_down.plan import Plan
 from procedures.run_up import procedure as run_up
 from procedures.shared import assumptions
 from procedures.synchronous import bearings
+from procedures.synchronous.default_speeds import within_envelope
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
@@ -32,6 +33,7 @@ procedure = Procedure(
     measures=run_up.MEASURES,
     state=RigState.READY,
     plan=Plan,
+    planned=lambda rig: within_envelope(rig, Plan, "top_rad_s", "running_rad_s", "speeds_rad_s"),
     acquire=acquire,
     evaluate=run_up.evaluate,
     measured=run_up.measured,

@@ -30,6 +30,7 @@ from procedures.estimator_compare.steps import ENGAGE, HANG, captured, read_take
 from procedures.one_axis.bank import RULES, Array, bank
 from procedures.one_axis.conventions import OneAxis, conventions
 from procedures.shared import assumptions
+from procedures.shared.default_masses import nth_lightest
 
 VELOCITY = Quantity(
     "velocity_error", "1", "RMS of velocity less derivative over the derivative's rms, before the switch"
@@ -187,6 +188,7 @@ procedure = Procedure(
     measures=MEASURES,
     state=RigState.LEVITATED,
     plan=Plan,
+    planned=lambda rig: nth_lightest(rig, load=0),
     acquire=acquire,
     evaluate=evaluate,
     measured=measured,

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from bench.errors import AnalysisError
 from bench.figures import Shown
@@ -30,6 +31,7 @@ from procedures.load_response.sequence import INTEGRATORS, chosen, lead, masses
 from procedures.load_response.sequence import step_count as counted
 from procedures.load_response.steps import STATE, Change, read_changes, read_rests
 from procedures.shared import assumptions
+from procedures.shared.default_masses import by_weight
 from procedures.stages.known_loads import loaded, sources
 
 PER = "displacement per newton without integrators, mean of approaches from both sides, over loads both ways"
@@ -163,6 +165,13 @@ def _of(unit: str) -> tuple[Quantity, ...]:
     return tuple(q for q in MEASURES if q.unit in units[unit])
 
 
+def planned(rig: RigFile) -> Mapping[str, Any]:
+    """The second and third lightest mass, or as many as there are."""
+    labels = by_weight(rig)
+    labels = labels[1:3] if len(labels) > 2 else labels
+    return {"masses": labels, "lever_masses": labels} if labels else {}
+
+
 def left_out(plan: Plan) -> tuple[Quantity, ...]:
     """What the plan does not do."""
     other = {"along": "rad", "around": "m"}.get(plan.axes)
@@ -181,6 +190,7 @@ procedure = Procedure(
     measures=MEASURES,
     state=RigState.HELD,
     plan=Plan,
+    planned=planned,
     acquire=acquire,
     evaluate=evaluate,
     measured=measured,

@@ -36,6 +36,7 @@ from procedures.shared.rates import rate_of
 from procedures.synchronous import bearings, dwelling
 from procedures.synchronous import checks as dwell_checks
 from procedures.synchronous.coil_peaks import find_uncertified
+from procedures.synchronous.default_speeds import within_envelope
 from procedures.synchronous.dwells import SLOW, can_capture, captured_channels, read_dwell
 from procedures.unbalance import procedure as unbalance
 from procedures.unbalance.procedure import CURRENT, D_MAX, MAJOR, READ, SHARE, VOLTAGE
@@ -237,6 +238,7 @@ procedure = Procedure(
     measures=MEASURES,
     state=RigState.READY,
     plan=Plan,
+    planned=lambda rig: within_envelope(rig, Plan, "top_rad_s", "running_rad_s", "speeds_rad_s"),
     acquire=acquire,
     evaluate=evaluate,
     measured=measured,

@@ -24,6 +24,7 @@ from procedures.amb_rotor.laws import of_laws, of_variants
 from procedures.shared import assumptions, first_look
 from procedures.synchronous import bearings, checks, dwelling, estimates, fitting, identified
 from procedures.synchronous.coil_peaks import find_uncertified
+from procedures.synchronous.default_speeds import within_envelope
 from procedures.synchronous.dwells import can_capture, read_dwells, required
 from procedures.synchronous.estimates import Results
 from procedures.synchronous.hum import listen, of_dwells
@@ -147,6 +148,7 @@ procedure = Procedure(
     measures=MEASURES,
     state=RigState.READY,
     plan=Plan,
+    planned=lambda rig: within_envelope(rig, Plan, "speeds_rad_s"),
     acquire=acquire,
     evaluate=evaluate,
     measured=measured,

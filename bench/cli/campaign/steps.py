@@ -75,8 +75,7 @@ def planned(campaign: Campaign, path: str, rig: RigFile, short: bool) -> tuple[P
 def _plan(procedure: Procedure, step: Step, rig: RigFile, short: bool) -> tuple[BenchPlan, tuple[str, ...]]:
     tables = [step.plan, step.virtual_plan] if short else [step.plan]
     assignments = tuple(f"{key}={_literal(value)}" for table in tables for key, value in table.items())
-    defaults = ("the rig file", rig.plans.get(procedure.name, {}))
-    return plans.assemble(procedure.plan, defaults, None, assignments), assignments
+    return plans.assemble(procedure.plan, procedure.defaults(rig), None, assignments), assignments
 
 
 def _literal(value: Any) -> str:
