@@ -24,8 +24,10 @@ check: setup
 	$(BIN)/lint-imports
 	$(MAKE) test
 
+# Two workers wait for links in real time, two compute (tests/groups.py). Only files with long tests are read.
 ci-long: setup
-	$(BIN)/python -m pytest -q -m "long and not links" -n 2 --dist loadgroup --durations=40 --durations-min=20 tests
+	$(BIN)/python -m pytest -q -m "long and not links" -n 4 --dist loadgroup --durations=60 --durations-min=10 \
+	    $$(grep -rlE "mark\.(long|faults)" tests --include="test_*.py")
 
 faults: setup
 	$(BIN)/python -m pytest -q -m faults tests/firmware/test_misbehaviours.py

@@ -6,16 +6,17 @@ not let it change: the marks are ignored without a word (pytest-xdist issue 1386
 
 from __future__ import annotations
 
+import os
 from typing import Any
 
+REAL_TIME = ("real-time", "real-time links")
 GROUPS = {
-    # Their processes keep up with wall time.
-    "real-time": ("tests/links/test_captures.py", "tests/links/test_chain.py", "tests/links/test_killed.py",
-                  "tests/links/test_live_run.py",
-                  "tests/links/test_two_benches.py", "tests/links/test_unplug.py", "tests/firmware/",
-                  "tests/cli/test_serve.py", "tests/drivers/test_heartbeat", "tests/drivers/test_live_link.py",
-                  "tests/drivers/test_fieldbus_live.py", "test_docs.py::test_commands_work[serve-a-rig]",
-                  "test_docs.py::test_commands_work[connect-a-rig]", "test_docs.py::test_commands_work[add-a-device]"),
+    # Their processes keep up with wall time, and mostly wait: two groups, each of which goes through its tests one by one.
+    "real-time": ("tests/firmware/", "tests/cli/test_serve.py", "tests/drivers/test_heartbeat",
+                  "tests/drivers/test_live_link.py", "tests/drivers/test_fieldbus_live.py",
+                  "test_docs.py::test_commands_work[serve-a-rig]", "test_docs.py::test_commands_work[connect-a-rig]",
+                  "test_docs.py::test_commands_work[add-a-device]"),
+    "real-time links": ("tests/links/",),
     # They begin with the same calibrations, which are made once.
     "identified": ("tests/procedures/test_amb_calibration.py", "tests/procedures/test_amb_facts.py",
                    "tests/procedures/test_force_constant.py", "tests/procedures/test_force_coupling.py",
@@ -25,24 +26,44 @@ GROUPS = {
     "chained pages": ("test_docs.py::test_commands_work[force-constant]",
                       "test_docs.py::test_commands_work[force-coupling]",
                       "test_docs.py::test_commands_work[force-map]",
+                      "test_docs.py::test_commands_work[lift-off]",
                       "test_docs.py::test_commands_work[negative-stiffness]"),
 }  # fmt: skip
-ALONE = ("tests/test_docs.py::test_commands_work",)
+PAGES = "tests/test_docs.py::test_commands_work"
 """Long tests of one file that share nothing: each goes to whichever worker is free."""
+
+FIRST = (*REAL_TIME, f"{PAGES}[loop-response]", "tests/test_described.py", "tests/test_machines.py",
+         "tests/procedures/test_maximum_speed.py", "tests/procedures/test_coverage_long.py",
+         "tests/procedures/test_moved_long.py", "tests/procedures/test_bearing_constant.py",
+         "tests/procedures/test_load_response_run.py")  # fmt: skip
+"""What takes longest is handed out first, or one worker ends long after the others."""
+NICE = 10  # of workers that only compute: those that must keep up with wall time find a free processor whenever they need one
 
 
 def group_of(nodeid: str) -> str:
     """The group's name; where there is none the file, whose fixtures are then made by one worker only."""
-    whole = nodeid if nodeid.startswith(ALONE) else nodeid.partition("::")[0]
+    whole = nodeid if nodeid.startswith(PAGES) else nodeid.partition("::")[0]
     return next((name for name, parts in GROUPS.items() if any(part in nodeid for part in parts)), whole)
 
 
 def scheduler(config: Any, log: Any) -> Any:
-    """Hands out groups whole, those with the most tests first."""
+    """Hands out groups whole: those in real time, what takes longest, then those with the most tests."""
     from xdist.scheduler import LoadScopeScheduling
 
     class ByGroup(LoadScopeScheduling):
         def _split_scope(self, nodeid: str) -> str:
             return group_of(nodeid)
 
+        def _assign_work_unit(self, node: Any) -> None:
+            if waiting := [name for name in FIRST if name in self.workqueue]:
+                self.workqueue.move_to_end(waiting[0], last=False)
+            super()._assign_work_unit(node)
+
     return ByGroup(config, log)
+
+
+def give_way(nodeid: str) -> None:
+    """Before a test on a worker among several: what only computes lets those go first that must keep up with wall time. There
+    is no way back for this worker, which is why their groups are handed out before all others."""
+    if "PYTEST_XDIST_WORKER" in os.environ and hasattr(os, "nice") and group_of(nodeid) not in REAL_TIME:
+        os.nice(max(NICE - os.nice(0), 0))

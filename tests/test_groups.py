@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -13,10 +14,12 @@ ROOT = Path(__file__).parent.parent
 
 
 def test_every_part_names_something() -> None:
-    for part in [part for parts in groups.GROUPS.values() for part in parts]:
+    assert {*groups.REAL_TIME} <= {*groups.GROUPS}
+    parts = [part for parts in groups.GROUPS.values() for part in parts]
+    for part in (*parts, *(name for name in groups.FIRST if name not in groups.REAL_TIME)):
         file, _, page = part.partition("::test_commands_work")
         if page:
-            assert list((ROOT / "docs").rglob(f"{page.strip('[]')}.md"))
+            assert list((ROOT / "docs").rglob(f"{page.strip('[]')}.md")), part
         else:
             assert list(ROOT.glob(f"{file}*")), part
 
@@ -24,7 +27,8 @@ def test_every_part_names_something() -> None:
 @pytest.mark.parametrize(
     ("nodeid", "group"),
     [
-        ("tests/links/test_killed.py::test_a_killed_rig_is_noticed", "real-time"),
+        ("tests/firmware/test_line_drivers.py::test_x", "real-time"),
+        ("tests/links/test_killed.py::test_a_killed_rig_is_noticed", "real-time links"),
         ("tests/drivers/test_heartbeat_alone.py::test_x[1]", "real-time"),
         ("tests/test_docs.py::test_commands_work[connect-a-rig]", "real-time"),
         ("tests/test_docs.py::test_commands_work[force-coupling]", "chained pages"),
@@ -56,3 +60,22 @@ def test_a_group_runs_on_one_worker(tmp_path: Path) -> None:
     assert len(lines) == 16
     assert len({words[0] for words in of_one}) == 1
     assert [words[-1][-2] for words in of_one] == list("01234567")
+
+
+def test_what_keeps_up_with_wall_time_goes_first_and_is_not_given_less_of_the_processor(tmp_path: Path) -> None:
+    """On two workers in a session of its own: files with more tests come after both groups in real time, and give way."""
+    (tmp_path / "pyproject.toml").write_text("[tool.pytest.ini_options]\n")
+    for name in ("conftest.py", "groups.py"):
+        (tmp_path / name).write_text((ROOT / "tests" / name).read_text())
+    base = os.nice(0)
+    yields = max(base, groups.NICE)
+    test = "import os, pytest\n@pytest.mark.parametrize('k', range({}))\ndef test_{}(k): assert os.nice(0) == {}\n"
+    for name, count, nice in (("firmware", 4, base), ("links", 3, base), ("sim", 40, yields), ("wire", 30, yields)):
+        (tmp_path / "tests" / name).mkdir(parents=True)
+        (tmp_path / "tests" / name / f"test_{name}.py").write_text(test.format(count, name, nice))
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-n", "2", "--dist", "loadgroup", "-p", "no:cacheprovider",
+         "-p", "no:hypothesispytest"], cwd=tmp_path, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout
+    assert "77 passed" in done.stdout
