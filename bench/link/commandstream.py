@@ -93,6 +93,8 @@ class CommandStream:
             return self._fed(data, now_ns)
 
     def _fed(self, data: bytes, now_ns: int) -> FrameBatch:
+        if not data and not self._own:  # what waits for the rest of a block waits on
+            return batch_of([])
         before = self._splitter.wrong
         out: list[bytes] = []
         for piece in self._splitter.feed(data):

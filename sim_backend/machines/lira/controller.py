@@ -6,6 +6,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Final
 
+import numpy as np
+
 from bench.errors import ConfigError
 from bench.link.commandstream import CommandStream
 from bench.link.fault_injection import Fault
@@ -88,13 +90,16 @@ class SpokenController(LineController):
         Returns:
             What the controller's lines and blocks are as messages, with the times at which they were whole.
         """
-        out, times = [], incoming["t_ns"]
+        out, times, left = [], incoming["t_ns"], len(incoming)
         for begin in range(0, ticks, SLICE):
             end = min(begin + SLICE, ticks)
-            due = (times >= t0_ns + begin * TICK_NS if begin else times == times) & (
-                times < t0_ns + end * TICK_NS if end < ticks else times == times
-            )
-            data, self._waiting = self._waiting + self._stream.encode(incoming[due]), b""
+            data, self._waiting = self._waiting, b""
+            if left:
+                due = (times >= t0_ns + begin * TICK_NS if begin else times == times) & (
+                    times < t0_ns + end * TICK_NS if end < ticks else times == times
+                )
+                left -= int(np.count_nonzero(due))
+                data += self._stream.encode(incoming[due])
             said = self.uart.advance((end - begin) * TICK_NS * 1e-9, data)
             if len(batch := self._stream.feed(said, t0_ns + end * TICK_NS)):
                 out.append(batch)

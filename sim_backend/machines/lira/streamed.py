@@ -66,12 +66,15 @@ class Streamed:
 
 def told(count: int, row: Array) -> bytes:
     """The bytes of one sample."""
-    signed = [_held(round(row[k] / lsb), -(2**15), 2**15 - 1) for k, lsb in zip(SIGNED, LSB, strict=True)]
-    signed[5] = (round(row[SIGNED[5]] / LSB[5]) + 2**15) % 2**16 - 2**15  # an angle comes round
-    supply = _held(round(row[SUPPLY] / 0.01), 0, 0xFFFF)
-    age = min(round(row[HEARD] * 1e3), 0xFFFF) if row[HEARD] >= 0 else 0xFFFF
-    speed = _held(round(row[SPEED] / 0.005), -(2**15), 2**15 - 1)
-    return TOLD.pack(count, *signed, supply, int(row[STATE]), int(row[FAULT]), int(row[LIMITED]), speed, age)
+    values = row.tolist()  # whose rounding costs less than that of numpy's
+    signed = [round(values[k] / lsb) for k, lsb in zip(SIGNED, LSB, strict=True)]
+    signed[5] = (signed[5] + 2**15) % 2**16 - 2**15  # an angle comes round
+    if min(signed) < -(2**15) or max(signed) > 2**15 - 1:
+        signed = [_held(x, -(2**15), 2**15 - 1) for x in signed]
+    supply = _held(round(values[SUPPLY] / 0.01), 0, 0xFFFF)
+    age = min(round(values[HEARD] * 1e3), 0xFFFF) if values[HEARD] >= 0 else 0xFFFF
+    speed = _held(round(values[SPEED] / 0.005), -(2**15), 2**15 - 1)
+    return TOLD.pack(count, *signed, supply, int(values[STATE]), int(values[FAULT]), int(values[LIMITED]), speed, age)
 
 
 def _held(value: int, low: int, high: int) -> int:
