@@ -70,6 +70,17 @@ def test_orders_that_differ_widen_what_they_say_together() -> None:
     assert unlikely.value == pytest.approx(alone.value)
 
 
-def test_what_cannot_be_fitted_is_refused() -> None:
-    with pytest.raises(AnalysisError, match="six or more"):
-        fitted(HZ[:4], curve(HZ[:4]), np.ones(4), 10.0)
+@pytest.mark.parametrize("count", [4, 6])
+def test_what_cannot_be_fitted_is_refused(count: int) -> None:
+    """The first of the orders has five complex terms: six lines leave it two numbers, too few to say how well it fits."""
+    with pytest.raises(AnalysisError, match="seven or more"):
+        fitted(HZ[:count], curve(HZ[:count]), np.ones(count), 10.0)
+
+
+def test_seven_lines_are_enough_for_one_pole() -> None:
+    hz = np.arange(60.0, 81.0, 3.0)
+    z = 1.0 + 5.0 / (1j * (hz - 70.0) + 4.0)
+    assert hz.size == 7
+    found = top(fitted(hz, z, np.full(7, 1e-10), math.inf), 60.0, 78.0)
+    assert found.value == pytest.approx(1.0 + 5.0 / 4.0, rel=1e-4)
+    assert found.at == pytest.approx(70.0, abs=0.05)

@@ -19,7 +19,7 @@ from bench.errors import AnalysisError
 
 ORDERS = ((3, 1), (3, 2), (4, 2), (4, 3), (5, 3), (6, 4))  # terms in u above and below
 POINTS, DRAWS = 201, 300
-LEAST = 6  # lines
+LEAST = 7  # lines, which the first of the orders takes
 STEPS = 40  # of the descent, at most
 NEGLIGIBLE = 1e-3  # weight of an order
 STRONG = 0.25  # share of a curve that a pole must give to be a resonance
@@ -77,7 +77,7 @@ def fitted(x: Array, z: Complex, power: Array, dof: float) -> Rational:
     known with `dof` degrees of freedom.
 
     Raises:
-        AnalysisError: fewer than six lines.
+        AnalysisError: fewer than seven lines.
     """
     return orders(x, z, power, dof)[0]
 
@@ -89,7 +89,7 @@ def orders(x: Array, z: Complex, power: Array, dof: float) -> list[Rational]:
 
     if x.size < LEAST or z.shape != x.shape or power.shape != x.shape:
         raise AnalysisError(
-            f"rational model: found {x.size} lines and {power.size} variances; expected six or more of each"
+            f"rational model: found {x.size} lines and {power.size} variances; expected seven or more of each"
         )
     middle, half = float(x[0] + x[-1]) / 2, float(x[-1] - x[0]) / 2
     u, root = (x - middle) / half, 1 / np.sqrt(np.maximum(power, 1e-300))

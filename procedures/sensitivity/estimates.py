@@ -132,6 +132,8 @@ def _looked(hz: Array, z: Complex, power: Array, k: int) -> Candidate:
         return Candidate(float(hz[k]), float(NEAR * hz[k]))
     model = fitted(hz[near], z[near], power[near], math.inf)
     at = top(model, float(hz[near][0]), float(hz[near][-1]))
+    if not at.inside:  # at an end of its lines, of which none is greater than `k`, or which is refined already
+        return Candidate(float(hz[k]), float(NEAR * hz[k]))
     step = float(np.diff(hz[near]).min())
     width = min(max(model.width(at.at), step / 2), 0.6 * at.at)
     return Candidate(at.at, width if math.isfinite(width) else NEAR * at.at)

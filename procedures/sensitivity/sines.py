@@ -16,7 +16,7 @@ import numpy as np
 from bench.analysis.responses import Response
 from bench.rigfile import RigFile
 from procedures.amb_rotor.conventions import conventions
-from procedures.sensitivity.estimates import FINEST, IN_WIDTH, LEAST, REACH, Candidate, binary
+from procedures.sensitivity.estimates import FEWEST, FINEST, IN_WIDTH, LEAST, REACH, Candidate, binary
 from procedures.sensitivity.injection import Comb
 from procedures.sensitivity.plan import Plan
 from procedures.sensitivity.steps import HALF, MODE, REFINED, SURVEY, WIRING, Grid, Taken
@@ -87,6 +87,8 @@ def refinements(rig: RigFile, plan: Plan, about: Candidate) -> list[Pass]:
     step = max(binary(about.width / IN_WIDTH), FINEST)
     reach, high = max(REACH * about.width, LEAST * step), highest(rig, plan)
     lines = [hz for hz in np.arange(about.hz - reach, about.hz + reach + step / 2, step).tolist() if hz > plan.low_hz]
+    while len(lines) < FEWEST:  # what is cut off below is added above: fewer tell no maximum
+        lines.append((lines[-1] if lines else plan.low_hz) + step)
     out = []
     for kind, share in ((REFINED, 1.0), (HALF, 0.5)):
         made = [sine(hz, share * amplitude(rig, plan), rate(rig, plan), max(REFINED_S, 1 / step)) for hz in lines]

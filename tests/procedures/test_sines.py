@@ -18,7 +18,7 @@ from bench.procedure import Measured
 from bench.rigfile import load_rig
 from procedures.amb_rotor.conventions import conventions
 from procedures.sensitivity import sines
-from procedures.sensitivity.estimates import Candidate
+from procedures.sensitivity.estimates import FEWEST, Candidate, candidates
 from procedures.sensitivity.margins import fall, margins, phase, rise
 from procedures.sensitivity.plan import Plan
 from procedures.sensitivity.procedure import check, procedure
@@ -52,6 +52,51 @@ def test_a_peak_is_refined_by_lines_within_its_width_at_both_amplitudes() -> Non
     assert all(c.first <= sines.highest(rig, plan) for c in full)
 
 
+def test_about_the_lowest_line_enough_are_left() -> None:
+    """Below low_hz nothing is injected: above, as many more, for fewer than eight show no maximum."""
+    passes = sines.refinements(load_rig(STAND), Plan(), Candidate(2.0, 0.6))
+    full = [c.first for kind, _, c in passes if kind == REFINED]
+    assert full == [3.0 + k for k in range(FEWEST)]
+
+
+def _flat(hz: npt.NDArray[np.float64], damping: float, slow_s: float) -> npt.NDArray[np.complex128]:
+    """S of the same shaft whose bearing holds it one and a half times as strongly as the field pushes: without an integrator
+    |S| is 1/(1.5 - 1) = 2 at rest, and falls over octaves from there."""
+    w, own = 2j * math.pi * hz, 2 * math.pi * 60
+    push = own**2 / 0.5
+    loop = (1.5 * push * (1 + 1 / (slow_s * w)) + 2 * damping * own * w) * np.exp(-1e-4 * w) / (w**2 - push)
+    return np.asarray(1 / (1 + loop))
+
+
+@pytest.mark.parametrize(("damping", "slow_s"), [(1.5, 1e9), (1.5, 3.0)])
+@pytest.mark.parametrize("noise", [2e-3, 6e-3, 1.5e-2])
+def test_a_flat_sensitivity_is_refined_where_it_is_greatest(damping: float, slow_s: float, noise: float) -> None:
+    """No resonance: a model of lines over an octave ends higher than its middle, where they are few."""
+    rig, plan, rng = load_rig(STAND), Plan(), np.random.default_rng(7)
+    wide = np.array([c.first for _, _, c in sines.surveys(rig, plan)[1:]])
+    fine = np.geomspace(2.0, 1800.0, 5000)
+    size = np.abs(_flat(fine, damping, slow_s))
+    assert np.ptp(np.log2(fine[size > 0.95 * size.max()])) > 1.5
+    for _ in range(5):
+        seen = _drawn(_flat(wide, damping, slow_s), wide, noise, rng)
+        greatest = 0.0
+        for found in candidates([seen], octaves=True):
+            lines = [c.first for kind, _, c in sines.refinements(rig, plan, found) if kind == REFINED]
+            assert len(lines) >= FEWEST
+            greatest = max(greatest, float(np.abs(_flat(np.linspace(lines[0], lines[-1], 300), damping, slow_s)).max()))
+        assert greatest > 0.98 * size.max()
+
+
+def test_where_no_maximum_is_inside_the_line_itself_is_looked_at() -> None:
+    """|S| falls from the lowest line on: models about the lines that follow rise to that one, which is looked at already."""
+    wide = np.array([c.first for _, _, c in sines.surveys(load_rig(STAND), Plan())[1:]])
+    rng = np.random.default_rng(11)
+    for _ in range(5):
+        found = candidates([_drawn(_flat(wide, 1.5, 1e9), wide, 1e-3, rng)], octaves=True)
+        assert len(found) == 3
+        assert len({c.hz for c in found} & set(wide.tolist())) == 3
+
+
 def test_a_plan_that_asks_too_much_is_refused_before_anything_starts() -> None:
     rig = load_rig(STAND)
     assert not [*check(rig, Plan()), *procedure.problems(rig, Plan())]
@@ -73,15 +118,20 @@ def _loop(hz: npt.NDArray[np.float64]) -> npt.NDArray[np.complex128]:
     return np.asarray(1 / (1 + loop))
 
 
-def _taken(kind: str, hz: npt.NDArray[np.float64], noise: float, rng: np.random.Generator) -> Any:
+def _drawn(
+    s: npt.NDArray[np.complex128], hz: npt.NDArray[np.float64], noise: float, rng: np.random.Generator
+) -> Response:
     """Lines of S whose noise is a share of it that grows with the frequency, known by four periods."""
-    s = _loop(hz)
     size = np.abs(s) * noise * np.sqrt(1 + (hz / 200) ** 2)
     drawn = (rng.standard_normal((4, hz.size)) + 1j * rng.standard_normal((4, hz.size))) * size * math.sqrt(2)
     off = np.stack([(drawn - drawn.mean(axis=0)).real, (drawn - drawn.mean(axis=0)).imag], axis=-1)
     covariance = np.einsum("pmi,pmj->mij", off, off) / 12
-    seen = Response(hz, s + drawn.mean(axis=0), covariance, np.ones(hz.size), 3.0)
-    none = np.empty(0)
+    return Response(hz, s + drawn.mean(axis=0), covariance, np.ones(hz.size), 3.0)
+
+
+def _taken(kind: str, hz: npt.NDArray[np.float64], noise: float, rng: np.random.Generator) -> Any:
+    """A capture of them."""
+    seen, none = _drawn(_loop(hz), hz, noise, rng), np.empty(0)
     return Taken("a", 0.0, 0.0, kind, 0.0, Grid(hz, 0.125, 0.02), seen, none, none, 0.0, 0.0, None, 8000.0, 0, 0, 0, 1,
                  conventions(load_rig(STAND)))  # fmt: skip
 
