@@ -16,13 +16,14 @@ class Series:
     """One curve or cloud of points. `u` draws 95 % error bars of half-length `u` on y.
 
     "faint" is a thin grey curve, "ridge" a thin one that hides what is behind and below it, "guide" a dashed curve in ink for
-    limits and circles, "mark" filled dots in the colour of the curve before. What has no `label` is not in the legend.
+    limits and circles, "mark" filled dots in the colour of the curve before, "box" open squares in ink about points. What has
+    no `label` is not in the legend.
     """
 
     label: str
     x: Array
     y: Array
-    style: Literal["line", "points", "both", "faint", "ridge", "guide", "mark"] = "line"
+    style: Literal["line", "points", "both", "faint", "ridge", "guide", "mark", "box"] = "line"
     u: Array | None = None
 
 

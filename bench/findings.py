@@ -8,6 +8,7 @@ from enum import StrEnum
 from typing import Any, NoReturn
 
 SIMULATED_CONTROLLER = "simulated-controller"  # a live run whose controller says that it is a simulated one
+CERTIFICATE_OVERDUE = "certificate-overdue"  # past its due date on the day of the run, and results rest on it
 
 
 class Effect(StrEnum):

@@ -15,12 +15,12 @@ from reports.figurestyle import GRID, INK, tick_text
 
 ZONES = ("#e4f2e7", "#fdf6d8", "#fde6cf", "#f8d4cf")  # best to worst, pale: curves stand out
 COLOURS = "viridis"
-SPECIAL = ("faint", "guide", "mark", "ridge")
+SPECIAL = ("faint", "guide", "mark", "box", "ridge")
 GREY = "#8b949e"
 
 
 def special(axes: Axes, series: Series, look: dict[str, Any], position: int, label: str) -> Artist:
-    """Draws a faint curve, a guide, a mark or a ridge."""
+    """Draws a faint curve, a guide, a mark, a box or a ridge."""
     if series.style == "faint":
         return axes.plot(series.x, series.y, color=GREY, linewidth=0.5, label=label, zorder=1.9)[0]
     if series.style == "guide":
@@ -29,6 +29,9 @@ def special(axes: Axes, series: Series, look: dict[str, Any], position: int, lab
         return axes.plot(
             series.x, series.y, linestyle="none", marker="o", markersize=4.2, color=look["color"], label=label, zorder=5
         )[0]
+    if series.style == "box":
+        return axes.plot(series.x, series.y, linestyle="none", marker="s", markersize=8.5, markerfacecolor="none",
+                         markeredgewidth=0.8, color=look["color"], label=label, zorder=5)[0]  # fmt: skip
     order = 2 + 0.001 * position
     if series.y.size:
         axes.fill_between(series.x, series.y, series.y.min(), color="white", linewidth=0, zorder=order)

@@ -172,13 +172,13 @@ def _panel(axes: Axes, figure: Figure) -> list[Artist]:
 
 
 def _looks(dense: list[Series]) -> list[dict[str, Any]]:
-    """Of each series: curves take the colours in turn, marks that of the curve before, guides and ridges ink."""
+    """Of each series: curves take the colours in turn, marks that of the curve before, guides, boxes and ridges ink."""
     curves = [s for s in dense if s.style not in kinds.SPECIAL and _fitted(s, dense) is None]
     looks: list[dict[str, Any]] = []
     taken = 0
     for series in dense:
         of = _fitted(series, dense[: len(looks)])
-        if series.style in ("faint", "guide", "ridge"):
+        if series.style in ("faint", "guide", "box", "ridge"):
             looks.append({"color": INK, "marker": ""})
         elif of is not None:
             looks.append({**looks[of], "fit": True})

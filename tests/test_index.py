@@ -15,12 +15,14 @@ import pytest
 from bench import lock
 from bench.cli.runs import RunsRequest, runs_command
 from bench.errors import ConfigError
-from bench.findings import SIMULATED_CONTROLLER, Finding
+from bench.findings import CERTIFICATE_OVERDUE, SIMULATED_CONTROLLER, Finding
 from bench.quantity import Quantity
 from bench.record.limits import Limit
 from bench.record.outcomes import Outcome
 from bench.record.records import findings_of, measurement, missing, read_record, unfinished, write_record
 from bench.record.setup import Certified, Setup
+from bench.rigfile.certificates import OutOfDate
+from bench.rigfile.elements import Certificate
 from bench.run import index
 from bench.run.indexstore import take_in
 from bench.uncertainty import Estimate, Influence
@@ -258,3 +260,24 @@ def test_damage_within_the_index_is_seen_where_it_is_read(tmp_path: Path) -> Non
     (tmp_path / index.NAME).write_bytes(whole[:4096] + b"\xff" * (len(whole) - 4096))
     assert len(index.results(tmp_path, quantity="K_i")) == 60
     assert len(index.entries(tmp_path)) == 60
+
+
+def test_results_say_which_overdue_certificates_they_rest_on(tmp_path: Path) -> None:
+    """Of a result alone what is in its own budget; and nothing of a record that says nothing."""
+    span, mass = (Influence(i, i, 1e-3, "1", "B", "normal") for i in ("geometry/amb_span", "masses/M1"))
+    made = [
+        Quantity(name, "m", "length").measured(Estimate(1.0, "m", {i: 1.0})) for name, i in (("L", span), ("M", mass))
+    ]
+    late = OutOfDate("span", Certificate(number="SIM-L-102", due="2025-12-31"), False, (span.id, "geometry/other"))
+    told = findings_of([Finding(CERTIFICATE_OVERDUE, late.told, "certificates.span")])
+    setup = Setup("ab" * 32, "", {}, {})
+    found = []
+    for second, (setting, findings) in enumerate(((setup, told), (setup, ()), (None, ()))):
+        path = run(tmp_path, second)
+        record = dataclasses.replace(
+            read_record(path / "record.json"), setup=setting, findings=findings,
+            measurements=tuple(measurement(m, None) for m in made),
+        )  # fmt: skip
+        write_record(path / "record.json", record)
+    found = [(r.name, r.overdue) for r in index.results(tmp_path)]
+    assert found == [("L", "span"), ("M", ""), ("L", ""), ("M", ""), ("L", None), ("M", None)]

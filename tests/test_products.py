@@ -55,9 +55,26 @@ def test_a_file_for_the_results_and_for_each_panel_and_map(tmp_path: Path, to: T
 def test_results_are_those_that_were_measured(tmp_path: Path) -> None:
     rows = parquet.read_table(written(tmp_path, "parquet")["results.parquet"]).to_pylist()
     assert rows == [{
-        "name": "s_max", "where": "yi, at rest", "unit": "1", "value": 3.1, "standard_uncertainty": 0.01,
-        "low": 3.08, "high": 3.13, "coverage_probability": 0.95, "verdict": "pass",
+        "name": "s_max", "where": "yi, at rest", "unit": "1", "value": 3.1, "standard_uncertainty": 0.01, "dof": 20.0,
+        "coverage_factor": 2.09, "expanded_uncertainty": 0.021, "low": 3.08, "high": 3.13, "coverage_probability": 0.95,
+        "verdict": "pass",
     }]  # fmt: skip
+
+
+@pytest.mark.parametrize("to", ["parquet", "csv"])
+def test_results_say_infinitely_many_degrees_of_freedom_and_no_k_where_none_is_stated(
+    tmp_path: Path, to: Tabular
+) -> None:
+    many = dataclasses.replace(THERE, dof=None, coverage_factor=1.96)
+    alone = dataclasses.replace(THERE, dof=2.0, standard_uncertainty=None, coverage_factor=None)
+    (file, *_) = products(tmp_path, to, [many, alone], [])
+    if to == "csv":
+        with file.open(newline="") as text:
+            told = [(row["dof"], row["coverage_factor"], row["expanded_uncertainty"]) for row in csv.DictReader(text)]
+        assert told == [("inf", "1.96", "0.021"), ("2", "", "0.021")]
+    else:
+        rows = parquet.read_table(file).to_pylist()
+        assert [(r["dof"], r["coverage_factor"]) for r in rows] == [(math.inf, 1.96), (2.0, None)]
 
 
 def test_curves_say_their_series_and_leave_an_error_bar_out_where_there_is_none(tmp_path: Path) -> None:

@@ -48,7 +48,7 @@ def list_(
         str, typer.Option("--rig", metavar="RIG", help="Which procedures this rig can run, and what the others lack.")
     ] = "",
 ) -> int:
-    """Show the procedures and rigs that are there, or what one rig can run."""
+    """Show procedures, rigs and campaigns. With --rig what that one can run."""
     from bench.cli.check import show_abilities, show_list
 
     return show_abilities(rig) if rig else show_list()
@@ -74,7 +74,7 @@ def schema(
     ] = "",
     into: Annotated[Path | None, typer.Option("--into", metavar="FOLDER", help="Default for all: schemas.")] = None,
 ) -> int:
-    """Write JSON schemas of rig files, specs, campaigns and plans, for editors.
+    """Write JSON schemas of our files, for editors. Rig files, specs, campaigns and plans.
 
     One goes to standard output, all go into a folder.
     """
@@ -88,7 +88,7 @@ def check(
     rig: o.RigArgument,
     procedure: Annotated[str, typer.Argument(metavar="PROCEDURE", help="Say all that it lacks for this one.")] = "",
 ) -> int:
-    """Validate a rig file, name every error at once, and say what it can run."""
+    """Validate a rig file and say what it can run. Names every error at once."""
     from bench.cli.check import check_rig_file
 
     return check_rig_file(rig, procedure)
@@ -123,7 +123,10 @@ def run(
     live_bind: o.LiveBind = None,
     verbose: o.Verbose = False,
 ) -> int:
-    """Run a procedure on a rig, or go on with a run that was stopped. The last line on standard output is the run directory."""
+    """Run a procedure on a rig. Or, with --continue, go on with a run that was stopped.
+
+    The last line on standard output is the run directory.
+    """
     from bench.cli.compose import Request
     from bench.cli.live import asked_page
     from bench.cli.meant import meant
@@ -166,7 +169,7 @@ def campaign(
         str, typer.Option(metavar="ADDRESS", help="Many: on the workers of a Dask scheduler, as tcp://HOST:8786.")
     ] = "",
 ) -> int:
-    """Run a list of procedures on a rig, or on many virtual ones; goes on where it was stopped.
+    """Run a list of procedures on a rig. Also on many virtual ones; goes on where it was stopped.
 
     The last line on standard output is the campaign's directory.
     """
@@ -244,7 +247,7 @@ def serve(
     live_port: o.LivePort = None,
     live_bind: o.LiveBind = None,
 ) -> int:
-    """Serve the simulated rig in real time, for `run --backend live` and for programs of your own.
+    """Serve the simulated rig in real time. For `run --backend live` and for programs of your own.
 
     Prints an endpoint a line, then `ready`; ends on Ctrl-C.
     """
@@ -275,7 +278,7 @@ def map_(
     ] = "",
     out: Annotated[Path | None, typer.Option("--out", help="Folder of the results; default maps/TABLE.")] = None,
 ) -> int:
-    """Identify the force map of a motor from a table of operating points. Needs no rig."""
+    """Identify a motor's force map from operating points. They stand in a table; no rig is needed."""
     from bench.cli.force_map import Request, map_command
 
     return map_command(Request(table=table, poles=poles, against=against, out=out))

@@ -5,9 +5,11 @@ from __future__ import annotations
 import contextlib
 import gc
 import sys
+import textwrap
 from typing import TYPE_CHECKING
 
 from bench import catalogue
+from bench.progress_text import columns
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -81,10 +83,19 @@ def _nothing_collected() -> Iterator[None]:
 
 
 def _table(title: str, rows: list[tuple[str, str]]) -> None:
-    width = max(len(name) for name, _ in rows)
-    sys.stdout.write(f"{title}\n")
+    sys.stdout.write("".join(f"{line}\n" for line in (title, *_rows(rows, columns() if sys.stdout.isatty() else None))))
+
+
+def _rows(rows: list[tuple[str, str]], width: int | None) -> Iterator[str]:
+    """A row each, one line where no width is given; on a terminal what is longer goes on below itself."""
+    wide = max(len(name) for name, _ in rows)
     for name, about in rows:
-        sys.stdout.write(f"  {name:{width}}  {about}".rstrip() + "\n")
+        row = f"  {name:{wide}}  {about}".rstrip()
+        if width is None or len(row) <= width:
+            yield row
+        else:
+            yield from textwrap.wrap(row, max(width, wide + 20), subsequent_indent=" " * (wide + 4),
+                                     break_on_hyphens=False)  # fmt: skip
 
 
 def _load_line(load: BusLoad) -> str:

@@ -91,7 +91,7 @@ def show(
         str, typer.Option("--bind", metavar="ADDR", help="Address of the page; default this computer alone.")
     ] = "127.0.0.1",
 ) -> int:
-    """Show the runs of a folder on a page: results, reports and trends. Its address is printed.
+    """Show the runs of a folder on a page. Results, reports and trends; its address is printed.
 
     Changes nothing; ends on Ctrl-C.
     """
@@ -110,7 +110,7 @@ def compare(
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Every quantity, and more of each budget.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="As JSON.")] = False,
 ) -> int:
-    """Compare two runs: the difference B - A of each quantity, what they share removed.
+    """Compare two runs, quantity by quantity. The difference B - A of each, what they share removed.
 
     |E_n| beyond 1: the 95 % interval of the difference leaves 0 out.
     """
@@ -141,7 +141,7 @@ def trend(
     json: Annotated[bool, typer.Option("--json", help="As data, for programs.")] = False,
     figure: Annotated[Path | None, typer.Option("--figure", metavar="FILE", help="Also draw it, as SVG.")] = None,
 ) -> int:
-    """Follow a quantity over the runs of a folder: control charts, drift, and when its limit is near."""
+    """Follow a quantity over the runs of a folder. Control charts, drift, and when its limit is near."""
     from bench.cli.trend import TrendRequest, trend_command
 
     asked = TrendRequest(quantity=quantity, out=out, rig=rig, procedure=procedure, seed=seed, last=last, weight=weight,

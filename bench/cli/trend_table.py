@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from collections import Counter
 from collections.abc import Iterator
 from itertools import repeat
 
@@ -17,6 +18,7 @@ MARKS = {
     "x": "value beyond its limits",
     "e": "EWMA beyond its limits",
     "w": "own U wider than the limits",
+    "d": "rests on a certificate past its due date",
     "F": "FAIL",
     "?": "INDETERMINATE",
 }
@@ -99,7 +101,7 @@ def _fitting(x: float | None, t: Told, width: int) -> str:
 
 def _marks(s: Segment, k: int) -> list[str]:
     wide = s.wide[k] and not all(s.wide)
-    found = {"x": s.beyond[k], "e": s.ewma_beyond[k], "w": wide, "F": s.results[k].outcome == "FAIL",
+    found = {"x": s.beyond[k], "e": s.ewma_beyond[k], "w": wide, "d": s.overdue[k], "F": s.results[k].outcome == "FAIL",
              "?": s.results[k].outcome == "INDETERMINATE"}  # fmt: skip
     return [mark for mark, said in found.items() if said]
 
@@ -144,6 +146,15 @@ def _said(s: Segment, t: Told, weight: float) -> Iterator[str]:
         if not s.signals and len(s.results) > s.chart.baseline:
             yield f"no signal in the {len(s.results) - s.chart.baseline} runs since"
     yield from _drift(s, t)
+    yield from _overdue(s)
+
+
+def _overdue(s: Segment) -> Iterator[str]:
+    """Certificates that were past their due dates, each with the number of runs that rest on it."""
+    late = Counter(key for r in s.results for key in filter(None, (r.overdue or "").split(", ")))
+    for key, runs in late.items():
+        yield (f"certificate {key} was past its due date in {runs} of {len(s.results)} runs: a change of it since it was "
+               "issued is in no U")  # fmt: skip
 
 
 def _disturbed(s: Segment, baseline: int) -> Iterator[str]:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from bench.findings import Effect
+from bench.findings import CERTIFICATE_OVERDUE, Effect
 from bench.record.outcomes import Outcome
 from bench.record.records import Record
 
 DOUBTFUL = (Outcome.ABORTED, Outcome.ERROR, Outcome.INDETERMINATE)
-OUT_OF_DATE = ("certificate-overdue", "certificate-ahead")
+OUT_OF_DATE = (CERTIFICATE_OVERDUE, "certificate-ahead")
 
 
 def cautions(a: Record, b: Record) -> Iterator[str]:

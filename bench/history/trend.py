@@ -90,6 +90,11 @@ class Segment:
         return [False] * c.baseline + [bool(o) for o in outside]
 
     @property
+    def overdue(self) -> list[bool]:
+        """Whether each value rests on a certificate that was past its due date on the day of its run, as its record says."""
+        return [bool(r.overdue) for r in self.results]
+
+    @property
     def wide(self) -> list[bool]:
         """Whether a run's own U exceeds the half width of the limits: its value is less sure than the chart is narrow."""
         return [self.chart is not None and bool(u > self.chart.limits.half) for u in self.expanded]

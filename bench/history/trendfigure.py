@@ -16,6 +16,7 @@ from bench.history.trendunits import Told, moment, told
 SPAN = 3.0  # times the height of values and limits: an acceptance limit farther off would flatten them
 TICKS = 4
 BEYOND, LIMITS = "beyond the limits", "control limits"
+OVERDUE = "certificate past its due date"
 
 
 def figure(trend: Trend) -> Figure:
@@ -47,7 +48,7 @@ def _told_once(series: list[Series]) -> list[Series]:
     seen: set[str] = set()
     out = []
     for one in series:
-        again = one.label in seen and one.label in (BEYOND, LIMITS)
+        again = one.label in seen and one.label in (BEYOND, OVERDUE, LIMITS)
         out.append(replace(one, label="") if again else one)
         seen.add(one.label)
     return out
@@ -63,6 +64,9 @@ def _values(s: Segment, t: Told, start: float, label: str) -> Iterator[Series]:
     beyond = np.array(s.beyond)
     if beyond.any():
         yield Series(BEYOND, x[beyond], s.values[beyond] / scale, "mark")
+    overdue = np.array(s.overdue)
+    if overdue.any():
+        yield Series(OVERDUE, x[overdue], s.values[overdue] / scale, "box")
     if s.chart is not None:
         limits = s.chart.limits
         ends = np.array([x[0], x[-1]])

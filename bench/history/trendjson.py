@@ -63,6 +63,7 @@ def _runs(s: Segment) -> list[dict[str, Any]]:
             "run_id": r.run_id, "started": r.started, "visit": r.visit, "outcome": r.outcome, "verdict": r.verdict,
             "value": r.value, "u": r.u, "U": r.U, "lower": r.lower, "upper": r.upper, "ewma": averaged[k],
             "baseline": k < watched, "beyond": s.beyond[k], "ewma_beyond": s.ewma_beyond[k], "wide": s.wide[k],
+            "overdue": None if r.overdue is None else r.overdue.split(", ") if r.overdue else [],
         }
         for k, r in enumerate(s.results)
     ]  # fmt: skip

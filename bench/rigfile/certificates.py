@@ -12,6 +12,8 @@ from bench.rigfile.numbers import numbers_in
 from bench.rigfile.places import Places
 from bench.rigfile.toleranced import Toleranced
 
+RESTS = "; the results rest on it: "
+
 
 @dataclass(frozen=True)
 class OutOfDate:
@@ -27,6 +29,16 @@ class OutOfDate:
         c = self.certificate
         which = f"certificate {self.name}" + (f" ({c.number}" + (f", {c.laboratory})" if c.laboratory else ")"))
         return f"{which} is dated {c.date}, which is in the future" if self.ahead else f"{which} was due on {c.due}"
+
+    @property
+    def told(self) -> str:
+        """With the numbers, as a finding says it."""
+        return f"{self}{RESTS}{', '.join(self.numbers)}"
+
+
+def numbers_told(said: str) -> frozenset[str]:
+    """The identities of the numbers that a finding names; none where it names none."""
+    return frozenset(filter(None, said.rpartition(RESTS)[2].split(", "))) if RESTS in said else frozenset()
 
 
 def certified_numbers(rig: RigFile) -> Mapping[str, Toleranced]:

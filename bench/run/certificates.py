@@ -7,7 +7,7 @@ from contextlib import suppress
 from datetime import date
 from typing import Any
 
-from bench.findings import Finding
+from bench.findings import CERTIFICATE_OVERDUE, Finding
 from bench.quantity import Measured
 from bench.recording import Recording
 from bench.rigfile.certificates import out_of_date
@@ -19,6 +19,5 @@ def overdue(recording: Recording[Any], measured: Iterable[Measured]) -> Iterator
     with suppress(ValueError):  # a recording that was cut off does not say when it began
         day = date.fromisoformat(recording.wall.get("started", "")[:10])
         for found in out_of_date(recording.rig, day, identities):
-            code = "certificate-ahead" if found.ahead else "certificate-overdue"
-            concerned = ", ".join(found.numbers)
-            yield Finding(code, f"{found}; the results rest on it: {concerned}", f"certificates.{found.name}")
+            code = "certificate-ahead" if found.ahead else CERTIFICATE_OVERDUE
+            yield Finding(code, found.told, f"certificates.{found.name}")

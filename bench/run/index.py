@@ -27,7 +27,8 @@ OF_MACHINE: dict[MachineKind, str] = {
     "simulated": "seed IS NOT NULL",
 }
 _READ = """r.run_id, procedure, rig, uut, started, seed, visit, outcome, name, quantity, place, unit, value, u, expanded, dof,
-    p, lower, upper, verdict, settings, firmware, calibrations, parameters, certificates, served"""
+    p, lower, upper, verdict, settings, firmware, calibrations, parameters, certificates, served,
+    overdue"""
 
 
 def add(run_dir: Path) -> None:

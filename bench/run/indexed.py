@@ -5,10 +5,11 @@ from __future__ import annotations
 import hashlib
 import json
 
-from bench.findings import SIMULATED_CONTROLLER
+from bench.findings import CERTIFICATE_OVERDUE, SIMULATED_CONTROLLER
 from bench.record.records import Measurement, Record, read_record
 from bench.record.setup import Setup
 from bench.rigfile.aliases import in_full
+from bench.rigfile.certificates import numbers_told
 from bench.run.indexrow import IndexEntry, MadeWith, Row
 from bench.rundir import RunDirectory
 from bench.uncertainty import PROBABILITY
@@ -35,7 +36,7 @@ def row(run: RunDirectory) -> Row:
         parameters="" if setup is None else digest(setup.parameters), firmware="" if setup is None else setup.firmware,
         calibrations=digest([(c.procedure, c.run_id) for c in record.calibrations]),
     )  # fmt: skip
-    return Row(entry, made_with, [_result(m, setup) for m in record.measurements])
+    return Row(entry, made_with, [_result(m, record) for m in record.measurements])
 
 
 def digest(content: object) -> str:
@@ -44,14 +45,15 @@ def digest(content: object) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:DIGITS]
 
 
-def _result(m: Measurement, setup: Setup | None) -> tuple[tuple[str, ...], tuple[float | str | None, ...]]:
+def _result(m: Measurement, record: Record) -> tuple[tuple[str, ...], tuple[float | str | None, ...]]:
+    setup = record.setup
     name = f"{m.name}@{m.where}" if m.where else m.name
     full = in_full({} if setup is None else setup.aliases, name)
     kind, _, place = full.partition("@")
     lower, upper = (None, None) if m.limit is None else (m.limit.low, m.limit.high)
     return (name, full, kind, place, m.unit), (
         m.value, m.standard_uncertainty, m.expanded_uncertainty, m.dof, m.coverage_probability or PROBABILITY, lower, upper,
-        m.verdict.value, _certificates(m, setup),
+        m.verdict.value, _certificates(m, setup), _overdue(m, record),
     )  # fmt: skip
 
 
@@ -62,6 +64,14 @@ def _certificates(m: Measurement, setup: Setup | None) -> str:
         return ""
     stated = {e.influence: setup.certified[e.influence] for e in m.budget if e.influence in setup.certified}
     return digest({i: (c.value, c.standard_uncertainty, c.distribution) for i, c in stated.items()}) if m.budget else ""
+
+
+def _overdue(m: Measurement, record: Record) -> str | None:
+    """Keys of the certificates past their due dates that this very result rests on, as the run told them on its day."""
+    influences = {e.influence for e in m.budget}
+    told = (f for f in record.findings if f.code == CERTIFICATE_OVERDUE)
+    found = [f.where.rpartition(".")[2] for f in told if not influences.isdisjoint(numbers_told(f.text))]
+    return ", ".join(dict.fromkeys(found)) if found or record.setup is not None else None
 
 
 def _uut(record: Record) -> str:

@@ -68,7 +68,8 @@ class MadeWith(NamedTuple):
 
 class Row(NamedTuple):
     """A run as its record goes into the tables. Of each result what it is called (name, that by kind and place, kind, place,
-    unit) and its numbers (value, u, U, dof, coverage probability, limits, verdict, digest of its certificates)."""
+    unit) and its numbers (value, u, U, dof, coverage probability, limits, verdict, digest of its certificates, those that were
+    overdue)."""
 
     entry: IndexEntry
     made_with: MadeWith
@@ -98,7 +99,8 @@ class Result(NamedTuple):
     Value, u, U and the limits are in `unit`; None is missing, an infinite dof, or an open limit. `settings` is a digest of the
     plan, `parameters` of those of the controller (bias currents, gains), `certificates` of what the rig file says of the
     numbers that this result rests on, `calibrations` of the runs adopted that it used; `firmware` is a text.
-    Each is "" where the record does not say it.
+    Each is "" where the record does not say it. `overdue` are the keys of the certificates that it rests on and that were past
+    their due dates on the day of the run, with commas between; None where the record does not say it.
     """
 
     run_id: str
@@ -127,6 +129,7 @@ class Result(NamedTuple):
     parameters: str
     certificates: str
     served: bool
+    overdue: str | None
     root: Path
 
     @property
@@ -172,7 +175,7 @@ TABLES = f"""
     CREATE INDEX runs_by_time ON runs (started, run_id, kind);
     CREATE TABLE names (number INTEGER PRIMARY KEY, {CALLED}, UNIQUE ({CALLED}));
     CREATE TABLE results (number INTEGER, run INTEGER, ordinal INTEGER, value, u, expanded, dof, p, lower, upper, verdict,
-                          certificates, PRIMARY KEY (number, run, ordinal)) WITHOUT ROWID;
+                          certificates, overdue, PRIMARY KEY (number, run, ordinal)) WITHOUT ROWID;
     CREATE INDEX results_by_run ON results (run);
 """
 """Results lie together by name, and refer to runs by number; runs refer to what many have in common: so a series or a listing

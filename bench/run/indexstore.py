@@ -18,7 +18,7 @@ from bench.run.indexrow import CALLED, KIND, MADE, TABLES, Row
 from bench.rundir import RunDirectory, named_as_run, runs_in
 
 NAME = "index.sqlite"
-VERSION = 6  # of the tables; another one is rebuilt
+VERSION = 7  # of the tables; another one is rebuilt
 TICK_NS = 1_000_000_000  # two changes of a folder that are nearer may have one time
 LISTED_NS = 10_000_000_000  # so much older an index is made that knows all of its folder: nothing else makes it so
 T = TypeVar("T")
@@ -131,7 +131,9 @@ def put(db: sqlite3.Connection, row: Row) -> None:
     run = db.execute(f"INSERT INTO runs VALUES ({', '.join('?' * len(of_run))})", of_run).lastrowid
     for ordinal, (called, numbers) in enumerate(row.results):
         number = _kept(db, "names", "number", CALLED, called)
-        db.execute("INSERT INTO results VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", (number, run, ordinal, *numbers))
+        db.execute(
+            "INSERT INTO results VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", (number, run, ordinal, *numbers)
+        )
 
 
 def _kept(db: sqlite3.Connection, table: str, key: str, columns: str, shared: tuple[str | int | None, ...]) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -36,7 +37,8 @@ def products(folder: Path, to: Tabular, found: Iterable[Measurement], figures: I
 
 
 def results(found: Iterable[Measurement]) -> pa.RecordBatch:
-    """One row per result: name, place, unit, value, standard uncertainty, interval and its probability, verdict."""
+    """One row per result: name, place, unit, value, standard uncertainty with its degrees of freedom (inf is infinitely many),
+    k and U, interval and its probability, verdict. u and k are empty where the interval alone is stated."""
     rows = [m for m in found if m.value is not None]
     ends = [m.interval or (None, None) for m in rows]
     return pa.record_batch(
@@ -46,6 +48,9 @@ def results(found: Iterable[Measurement]) -> pa.RecordBatch:
             "unit": pa.array([m.unit for m in rows], pa.string()),
             "value": pa.array([m.value for m in rows], pa.float64()),
             "standard_uncertainty": pa.array([m.standard_uncertainty for m in rows], pa.float64()),
+            "dof": pa.array([math.inf if m.dof is None else m.dof for m in rows], pa.float64()),
+            "coverage_factor": pa.array([m.coverage_factor for m in rows], pa.float64()),
+            "expanded_uncertainty": pa.array([m.expanded_uncertainty for m in rows], pa.float64()),
             "low": pa.array([low for low, _ in ends], pa.float64()),
             "high": pa.array([high for _, high in ends], pa.float64()),
             "coverage_probability": pa.array([m.coverage_probability for m in rows], pa.float64()),

@@ -12,6 +12,7 @@ from pyarrow import parquet
 from tiny_catalogue import TINY
 
 from bench import catalogue
+from bench.cli import check
 
 SHIPPED = catalogue.PROCEDURES
 
@@ -192,6 +193,27 @@ def test_list_and_help_name_what_there_is(bench: Bench) -> None:
     assert status == 0
     for command in ("list", "check", "run", "analyse", "report", "runs", "export"):
         assert f"  {command} " in out
+
+
+def test_help_says_what_each_command_does_in_whole_sentences(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    _, out, _ = bench("--help")
+    lines = out.partition("Commands:\n")[2].splitlines()
+    assert len(lines) > 15
+    assert [line for line in lines if not line.endswith(".") or line.endswith("...")] == []
+
+
+def test_a_list_goes_on_below_itself_on_a_narrow_terminal() -> None:
+    rows = [
+        ("step", "Steps"),
+        ("static-characteristics", "Static torque and force of a machine's phases, by load cells"),
+    ]
+    assert list(check._rows(rows, 60)) == [
+        "  step                    Steps",
+        "  static-characteristics  Static torque and force of a",
+        "                          machine's phases, by load cells",
+    ]
+    assert list(check._rows(rows, None))[1].endswith("by load cells")
 
 
 def test_check_says_the_bus_load(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:

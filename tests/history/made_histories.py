@@ -28,7 +28,8 @@ def result(k: int, value: float | None = 75.0, **given: object) -> Result:
         run_id=f"amb-calibration-{k:04}", procedure="amb-calibration", rig="tsbs12", uut="7",
         started=(START + timedelta(days=k)).isoformat(), seed=None, visit=None, outcome="PASS", name="K_i", quantity="K",
         where="inboard", unit="N/A", value=value, u=u, U=2 * u, dof=None, p=0.95, lower=70.0, upper=80.0, verdict="pass",
-        settings="plan", firmware="1", calibrations="c", parameters="p", certificates="m", served=False, root=Path("runs"),
+        settings="plan", firmware="1", calibrations="c", parameters="p", certificates="m", served=False, overdue="",
+        root=Path("runs"),
     )  # fmt: skip
     return plain._replace(**given)
 

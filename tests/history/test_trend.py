@@ -231,6 +231,24 @@ def test_the_figure_is_drawn() -> None:
     assert replace(shown, title="") != shown
 
 
+def test_values_by_an_overdue_certificate_are_marked() -> None:
+    """In the table, in a sentence with the certificate, in the figure and in the data; silence of a record stays silence."""
+    late = {10: "span", 11: "span, masses", 12: None}
+    found = of([result(k, v, overdue=late.get(k, "")) for k, v in enumerate(scattered(14))])
+    told = text(found, False)
+    rows = [line for line in told.splitlines()[3:] if line[:3].strip().isdigit()]
+    assert [k for k, row in enumerate(rows) if row.rpartition(" ")[2] == "d"] == [10, 11]
+    assert "certificate span was past its due date in 2 of 14 runs: " in told
+    assert "certificate masses was past its due date in 1 of 14 runs: " in told
+    assert "marks: d rests on a certificate past its due date\n" in told
+    (segment,) = as_data(found)["segments"]
+    assert [run["overdue"] for run in segment["runs"][9:]] == [[], ["span"], ["span", "masses"], None, []]
+    (box,) = (s for s in figure(found).series if s.style == "box")
+    assert (box.label, box.x.tolist()) == ("certificate past its due date", pytest.approx([10 + 1 / 3, 11 + 1 / 3]))
+    assert "certificate past its due date" in draw(figure(found)).svg
+    assert "d rests" not in text(of(results(scattered(14))), False)
+
+
 def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for k, v in enumerate(scattered(12)):
         record(tmp_path, k, v)
