@@ -15,10 +15,8 @@ import numpy.typing as npt
 from bench.errors import AnalysisError
 
 Array = npt.NDArray[np.float64]
-SHORT, LONG = (
-    (2, 2),
-    (3, 4),
-)  # samples to either side, and degree, of the curve that a peak is read from; of the other to compare
+SHORT = (2, 2)  # samples to either side, and degree, of the curve that a peak is read from
+LONG = (3, 4)  # of the one to compare
 WITHIN = 10  # places in a sample that it is looked at
 NEAR = 3  # samples to either side of a crossing, for a parabola that the encoder's counts leave steady
 TAIL_S = 0.3  # at the end of a record, where the rotor stands again
