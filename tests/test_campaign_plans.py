@@ -33,6 +33,16 @@ def test_a_shipped_campaign_fits_its_rig(name: str) -> None:
         assert len(planned(c, str(path), load_rig(c.rig), short)) == len(c.step)
 
 
+def test_a_friction_whose_width_is_judged_has_eight_degrees_of_freedom() -> None:
+    """b and c of run-downs both ways, less their means and less the cosine and the sine that all share while the motor carries.
+    With two of them T_c's interval was 1.2 to 1.3 times too wide."""
+    c, path = file.load("tsbs-drag")
+    step = next(s for s in planned(c, str(path), load_rig(c.rig), short=True) if s.procedure.name == "spindown")
+    plan: Any = step.plan
+    assert plan.motor_carries
+    assert 2 * 2 * (plan.repeats - 1) - 2 >= 8
+
+
 def test_tables_and_lists_of_a_plan_arrive() -> None:
     (step,) = planned(Campaign.parse(TABLES), "c.toml", load_rig("amb5dof"), short=False)
     plan: Any = step.plan

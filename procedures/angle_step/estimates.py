@@ -12,7 +12,7 @@ from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
 from procedures.angle_step import captured, counted, steps
 from procedures.angle_step.budget import OUTBOARD, at_motor, gained, sampled, within
-from procedures.angle_step.response import Response, response
+from procedures.angle_step.response import Excursion, Response, response
 from procedures.angle_step.steps import Case, Done
 from procedures.servomotor.conventions import conventions
 from procedures.shared.certificates import certified_gain
@@ -39,13 +39,14 @@ def by_case(moves: list[Done], rig: RigFile, band: float, count_rad: float, kp: 
     share = machine.sensor_share(rig.geometry["com_to_motor"].value, rig)
     gains = {axis: certified_gain(rig, channel) for axis, channel in machine.positions.items()}
     period = _period(moves)
+    tick = rig.devices["controller"].tick_s if machine.components == 2 else period
     bands = {case: max(band * case.size, 2 * count_rad) for case in steps.by_case(moves)}
     responses = {c: tuple(response(d.move, bands[c]) for d in done) for c, done in steps.by_case(moves).items()}
     finer, short = captured.by_case(moves, responses, rig, bands, count_rad, kp)
     out = {}
     for case, done in steps.by_case(moves).items():
         r = responses[case]
-        found = _estimates(case, r, gains, share, count_rad, period)
+        found = _estimates(case, r, gains, share, count_rad, period, tick)
         if all(math.isfinite(x.settling) for x in r) and case not in finer:
             found["settling_time"] = counted.settling_time(case.where, done, bands[case], count_rad)
         out[case] = Result(case, r, found | finer.get(case, {}), short.get(case, 0))
@@ -58,8 +59,8 @@ def _period(moves: list[Done]) -> float:
 
 
 def _estimates(
-    case: Case, r: Sequence[Response], gains: Mapping[str, Estimate], share: float, count: float, period: float
-) -> dict[str, Estimate]:
+    case: Case, r: Sequence[Response], gains: Mapping[str, Estimate], share: float, count: float, period: float, tick: float
+) -> dict[str, Estimate]:  # fmt: skip
     where = case.where
 
     def mean(name: str, unit: str, of: Callable[[Response], float]) -> Estimate:
@@ -67,20 +68,38 @@ def _estimates(
 
     slope = 1 / math.sqrt(np.mean([1 / x.slopes[0] ** 2 + 1 / x.slopes[1] ** 2 for x in r]))
     encoder = within(f"encoder/{where}", "encoder count", count / 2, "rad")
-    each = sampled(f"sampling/each/{where}", period, len(r))
-    floor = within(f"noise/{where}", "noise in a peak", max(x.floor for x in r), "m")
-    outboard = gained([(x.peak, x.towards) for x in r], OUTBOARD, gains)
-    at_rest = gained([(x.rest_peak, x.towards) for x in r], OUTBOARD, gains)
-    motor = gained([(x.peak_motor, x.towards_motor) for x in r], at_motor(share), gains)
+    outboard, motor = [x.outboard for x in r], [x.motor for x in r]
+    sensed = gained([(x.peak, x.towards) for x in outboard], OUTBOARD, gains)
+    at_rest = gained([(x.away, x.rest / max(x.away, 1e-300)) for x in outboard], OUTBOARD, gains)
+    at_outboard = sensed + _raised(f"outboard/{where}", outboard)
     return {
         "rise_time": mean("rise_time", "s", lambda x: x.rise) + encoder * (1 / slope),
         "overshoot": mean("overshoot", "1", lambda x: x.overshoot) + encoder * (1 / case.size),
         "final_error": mean("final_error", "rad", lambda x: x.final_error) + encoder,
-        "peak_outboard": mean("peak_outboard", "m", lambda x: x.peak) + outboard + floor,
-        "peak_motor": mean("peak_motor", "m", lambda x: x.peak_motor) + motor + floor,
-        "excess": mean("excess", "m", lambda x: x.peak - x.rest_peak) + outboard - at_rest + floor,
-        "saturated": mean("saturated", "s", lambda x: x.saturated) + each,
-    }
+        "peak_outboard": mean("peak_outboard", "m", lambda x: x.outboard.peak) + at_outboard,
+        "peak_motor": mean("peak_motor", "m", lambda x: x.motor.peak) + _raised(f"motor/{where}", motor)
+        + gained([(x.peak, x.towards) for x in motor], at_motor(share), gains),
+        "excess": mean("excess", "m", lambda x: x.outboard.peak - x.outboard.away) + at_outboard - at_rest,
+        "saturated": _cut(where, mean("saturated", "s", lambda x: x.saturated), period, tick, len(r)),
+    }  # fmt: skip
+
+
+def _raised(identity: str, found: Sequence[Excursion]) -> Estimate:
+    """What peaks of means are off, m: noise raises them by its floor at most, and a curve of more samples says otherwise."""
+    floor, otherwise = (float(np.mean(values)) for values in ([x.floor for x in found], [x.otherwise for x in found]))
+    noise = within(f"noise/{identity}", "noise in a peak", floor / 2, "m")
+    return noise - floor / 2 + within(f"noise/shape/{identity}", "shape of a peak between samples", otherwise, "m")
+
+
+def _cut(where: str, samples: Estimate, period: float, tick: float, steps: int) -> Estimate:
+    """How long an amplifier cut, s, of the samples that a cut fell in. Of a motor whose segments carry vectors a `tick` counts,
+    and such a sample holds one at least and ten at most: with a filter of 1 kHz the derivative cuts from count to count. Of
+    others the sample itself does."""
+    if tick == period:
+        return samples + sampled(f"sampling/each/{where}", period, steps)
+    least = tick / period
+    open_to = within(f"sampling/cut/{where}", "how much of a sample was cut", (1 - least) / 2 * samples.value, "s")
+    return samples * ((1 + least) / 2) + open_to + within(f"sampling/each/{where}", "sampling", tick / 2, "s")
 
 
 def _repeated(identity: str, unit: str, values: Sequence[float]) -> Estimate:

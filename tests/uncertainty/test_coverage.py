@@ -7,6 +7,7 @@ import math
 import GTC
 import numpy as np
 import pytest
+from scipy import optimize, special
 
 from bench.analysis.vectors import estimates
 from bench.errors import AnalysisError
@@ -81,6 +82,21 @@ def test_a_dominant_rectangle_goes_to_monte_carlo() -> None:
     assert "rectangular component r" in found.why
     assert (found.low, found.high) == pytest.approx((5 - 0.95 * 3**0.5, 5 + 0.95 * 3**0.5), abs=0.01)
     assert found.k == pytest.approx(1.645, abs=0.01)
+
+
+@pytest.mark.parametrize("share", [0.55, 0.7, 0.8, 0.9, 0.95])
+def test_k_of_a_rectangle_and_a_normal_is_that_of_their_sum(share: float) -> None:
+    """P(|R + N| <= U) = 0.95 by quadrature over the rectangle of half width 1; k goes from 1.65 to 1.92, and is never 2."""
+    sigma = math.sqrt((1 - share) / (3 * share))
+    at = np.linspace(-1, 1, 2001)
+
+    def within(half: float) -> float:
+        return float(np.mean(special.ndtr((half - at) / sigma) - special.ndtr((-half - at) / sigma)))
+
+    half = optimize.brentq(lambda x: within(x) - 0.95, 0.5, 3.0)
+    found = interval(estimate("r", 0.0, 1 / math.sqrt(3), distribution="rectangular") + estimate("n", 0.0, sigma))
+    assert pytest.approx(half, rel=0.006) == found.U
+    assert 1.65 < found.U / math.hypot(1 / math.sqrt(3), sigma) < 1.92
 
 
 def test_half_of_the_variance_is_the_border() -> None:
