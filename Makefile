@@ -9,7 +9,7 @@ READY := .venv/.ready
 # Tests start hundreds of processes: without its bytecode every one of them would compile the project again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test check format ci-long faults links browser pictures fuzz campaigns plants sound moved golden former bench clean lock setup wheel site gallery
+.PHONY: demo test check types format ci-long faults links browser pictures fuzz campaigns plants sound moved golden former bench clean lock setup wheel site gallery
 
 demo: setup
 	$(BIN)/bench run amb-calibration --rig tsbs12 --seed 1
@@ -20,9 +20,12 @@ test: setup
 check: setup
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
-	$(BIN)/mypy
-	$(BIN)/lint-imports
-	$(MAKE) test
+	$(MAKE) -j 2 types test
+
+# Beside the tests, of which the first wait in real time.
+types: setup
+	nice $(BIN)/mypy
+	nice $(BIN)/lint-imports
 
 # Two workers wait for links in real time, two compute (tests/groups.py). Only files with long tests are read.
 ci-long: setup
@@ -32,7 +35,8 @@ ci-long: setup
 faults: setup
 	$(BIN)/python -m pytest -q -m faults tests/firmware/test_misbehaviours.py
 
-# What `make ci-long` leaves out of what runs in real time, one by one: the chain's first step on every link, the maximum speed.
+# What `make ci-long` leaves out of what runs in real time, one by one: the chain's first step on every link, the maximum speed,
+# served readings like those that it takes over their limit.
 links: setup
 	$(BIN)/python -m pytest -q -m links tests/links
 

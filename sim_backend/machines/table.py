@@ -4,22 +4,19 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from typing import Any
+from importlib import import_module
+from typing import Any, cast
 
 from bench import extensions
 from bench.errors import ConfigError
 from bench.rigfile import RigFile
 from sim_backend.machine import Machine
-from sim_backend.machines.amb1dof.machine import AMB1DOF
-from sim_backend.machines.amb5dof.machine import AMB5DOF
-from sim_backend.machines.lira.machine import LIRA
-from sim_backend.machines.rlsrm.machine import RLSRM
-from sim_backend.machines.tsbs.machine import TSBS
-from sim_backend.machines.tsbs.six import TSBS6
-from sim_backend.machines.twin.machine import TWIN, twin
 
 OF_TSBS = "slope_i"  # that no simulated TSBS can be without
-MACHINES = {machine.name: machine for machine in (TSBS, TSBS6, AMB5DOF, AMB1DOF, LIRA, RLSRM)}
+TSBS, TWIN = "tsbs", "twin"
+MACHINES = {TSBS: "tsbs.machine.TSBS", "tsbs6": "tsbs.six.TSBS6", "amb5dof": "amb5dof.machine.AMB5DOF",
+            "amb1dof": "amb1dof.machine.AMB1DOF", "lira": "lira.machine.LIRA", "rlsrm": "rlsrm.machine.RLSRM"}  # fmt: skip
+"""Of ours by name, its module in this folder and its name there: a process loads the machine that it simulates alone."""
 
 
 def machine_of(rig: RigFile) -> Machine:
@@ -30,7 +27,7 @@ def machine_of(rig: RigFile) -> Machine:
         ConfigError: there is no such machine, its name is taken twice, a package's cannot be loaded, or no twin can be made of
             the rig file.
     """
-    name = rig.simulation.get("machine", TSBS.name if OF_TSBS in rig.simulation else TWIN)
+    name = rig.simulation.get("machine", TSBS if OF_TSBS in rig.simulation else TWIN)
     point = extensions.found(extensions.MACHINES, str(name), _owner(name))
     if point is not None:
         return _of_package(point)
@@ -39,12 +36,18 @@ def machine_of(rig: RigFile) -> Machine:
     if name not in MACHINES:
         known = (*MACHINES, TWIN, *extensions.names(extensions.MACHINES, dict.fromkeys((*MACHINES, TWIN), "")))
         raise ConfigError(f"rig {rig.name}: simulation.machine: found {name!r}; expected one of {', '.join(known)}")
-    return MACHINES[name]
+    return _ours(name)
 
 
 def _owner(name: object) -> str:
     """The module that holds a machine of ours; "" where it is none."""
     return "sim_backend.machines.table" if name in MACHINES or name == TWIN else ""
+
+
+@cache
+def _ours(name: str) -> Machine:
+    module, _, attribute = MACHINES[name].rpartition(".")
+    return cast(Machine, getattr(import_module(f"sim_backend.machines.{module}"), attribute))
 
 
 @cache
@@ -60,6 +63,8 @@ def _of_package(point: extensions.Point) -> Machine:
 
 
 def _twin(rig: RigFile) -> Machine:
+    from sim_backend.machines.twin.machine import twin
+
     try:
         return twin(rig)
     except ConfigError as error:
