@@ -135,8 +135,9 @@ def _crossing(t: Array, y: Array, level: float) -> tuple[float, float]:
 
 def curve(path: Array, reach: int, degree: int, means: bool = True) -> Array:
     """(2, WITHIN n): the places that a path (2, n) has within each sample, by the polynomial whose `means` over samples, or
-    else readings in their middle, are those of the sample and of `reach` more to either side (least squares). A curve through means
-    themselves would be lower than a peak by a twenty-fourth of its bend, and the highest of its samples by as much again."""
+    else readings in their middle, are those of the sample and of `reach` more to either side (least squares). A curve through
+    means themselves would be lower than a peak by a twenty-fourth of its bend, and the highest of its samples by as much
+    again."""
     at, powers = np.arange(-reach, reach + 1)[:, None], np.arange(degree + 1)[None]
     shapes = ((at + 0.5) ** (powers + 1) - (at - 0.5) ** (powers + 1)) / (powers + 1) if means else 1.0 * at**powers
     places = ((np.arange(WITHIN)[:, None] + 0.5) / WITHIN - 0.5) ** powers
