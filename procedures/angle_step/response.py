@@ -27,7 +27,8 @@ class Move:
     """One step. `t` (n,); `angle` (n,) rad; `orbit` and `motor` (2, n) m: x and y off the sensors' zero, at the outboard
     sensor and at the motor; `segments` (4, n) A; `saturated` (n,) where an amplifier cut its demand; `rest_orbit` and
     `rest_motor` (2, m) m, `rest_segments` (4, m) A of the standstill before. `step` rad is signed; `components` of a segment's
-    current: its amplitude, or q and d in turn; `rest_angle` (m,) rad, as `angle`."""
+    current: its amplitude, or q and d in turn; `rest_angle` (m,) rad, as `angle`; `means`: whether samples are means over their
+    period, or readings."""
 
     step: float
     t: Array
@@ -41,6 +42,7 @@ class Move:
     rest_segments: Array
     components: int = 1
     rest_angle: Array = field(default_factory=lambda: np.empty(0))
+    means: bool = True
 
     @property
     def torque(self) -> tuple[Array, Array]:
@@ -102,8 +104,8 @@ def response(m: Move, band: float) -> Response:
         settling=settled,
         overshoot=max(float(y.max()) / size - 1, 0.0),
         final_error=float((m.angle[tail] - m.step).mean()),
-        outboard=excursion(m.orbit, m.rest_orbit),
-        motor=excursion(m.motor, m.rest_motor),
+        outboard=excursion(m.orbit, m.rest_orbit, m.means),
+        motor=excursion(m.motor, m.rest_motor, m.means),
         saturated=float(m.saturated.sum()) * period,
         hold=(float(m.torque[0][:, tail].mean()), float(m.torque[1].mean())),
         slopes=(low[1], high[1]),
@@ -131,39 +133,40 @@ def _crossing(t: Array, y: Array, level: float) -> tuple[float, float]:
     return float(t[k - 1] + part * (t[k] - t[k - 1])), max(float(y[k] - y[k - 1]) / float(t[k] - t[k - 1]), 1e-6)
 
 
-def curve(path: Array, reach: int, degree: int) -> Array:
-    """(2, WITHIN n): the places that a path of means (2, n) has within each sample, by the polynomial whose means are those of
-    the sample and of `reach` more to either side, in the sense of least squares. A curve through the means themselves would be
-    lower than a peak by a twenty-fourth of its bend, and the highest of its samples by as much again."""
+def curve(path: Array, reach: int, degree: int, means: bool = True) -> Array:
+    """(2, WITHIN n): the places that a path (2, n) has within each sample, by the polynomial whose `means` over samples, or
+    else readings in their middle, are those of the sample and of `reach` more to either side (least squares). A curve through
+    means themselves would be lower than a peak by a twenty-fourth of its bend, and the highest of its samples by as much
+    again."""
     at, powers = np.arange(-reach, reach + 1)[:, None], np.arange(degree + 1)[None]
-    means = ((at + 0.5) ** (powers + 1) - (at - 0.5) ** (powers + 1)) / (powers + 1)
+    shapes = ((at + 0.5) ** (powers + 1) - (at - 0.5) ** (powers + 1)) / (powers + 1) if means else 1.0 * at**powers
     places = ((np.arange(WITHIN)[:, None] + 0.5) / WITHIN - 0.5) ** powers
-    kernel = places @ np.linalg.pinv(means)
+    kernel = places @ np.linalg.pinv(shapes)
     padded = np.pad(path, ((0, 0), (reach, reach)), mode="edge")
     out: Array = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1, axis=1) @ kernel.T
     return out.reshape(2, -1)
 
 
-def excursion(orbit: Array, rest: Array) -> Excursion:
-    """Of a path (2, n) m and the standstill before, (2, m) m, both means of their samples."""
-    radius, towards = peak_radius(orbit)
-    other = float(np.hypot(*curve(orbit, *LONG)).max())
-    return Excursion(radius, towards, abs(other - radius), rest.mean(axis=1), noise_floor(rest))
+def excursion(orbit: Array, rest: Array, means: bool = True) -> Excursion:
+    """Of a path (2, n) m and the standstill before, (2, m) m, `means` of their samples or readings."""
+    radius, towards = peak_radius(orbit, means)
+    other = float(np.hypot(*curve(orbit, *LONG, means)).max())
+    return Excursion(radius, towards, abs(other - radius), rest.mean(axis=1), noise_floor(rest, means))
 
 
-def peak_radius(orbit: Array) -> tuple[float, Array]:
+def peak_radius(orbit: Array, means: bool = True) -> tuple[float, Array]:
     """Greatest distance off centre, m, and its direction (2,). The largest of many noisy samples is biased high; the
     parabola takes most of that away, `noise_floor` bounds the rest."""
-    s = curve(orbit, *SHORT)
+    s = curve(orbit, *SHORT, means)
     radius = np.hypot(*s)
     k = int(np.argmax(radius))
     return float(radius[k]), s[:, k] / max(float(radius[k]), 1e-300)
 
 
-def noise_floor(rest: Array) -> float:
+def noise_floor(rest: Array, means: bool = True) -> float:
     """What the largest of the samples of a standstill is expected to exceed their middle by, from noise alone: the
     standard deviation of the curve through them times sqrt(2 ln n) (extremes of a normal sample)."""
-    s = curve(rest, *SHORT)
+    s = curve(rest, *SHORT, means)
     sigma = float(np.sqrt((s.std(axis=1) ** 2).mean()))
     return sigma * math.sqrt(2 * math.log(max(rest.shape[1], 2)))
 

@@ -100,7 +100,7 @@ def _read(recording: Recording[Any], step: Step, machine: Servomotor, share: flo
     flags = data[STATUS].astype(np.int64)
     return Done(
         case,
-        _move(data, rest, labels, machine, share),
+        _move(data, rest, labels, machine, share, recording.rig.binding.samples == "mean"),
         int(np.bitwise_or.reduce(flags[~rest])),
         int(np.bitwise_or.reduce(flags[rest])),
         tuple(c for c in (*positions(machine), *machine.segments) if np.ptp(data[c]) == 0),
@@ -135,7 +135,7 @@ def _torque(data: Mapping[str, npt.NDArray[Any]], machine: Servomotor) -> Array:
 
 def _move(
     data: Mapping[str, npt.NDArray[Any]], rest: npt.NDArray[np.bool_], labels: Mapping[str, Any], machine: Servomotor,
-    share: float,
+    share: float, means: bool,
 ) -> Move:  # fmt: skip
     step = float(labels["step_rad"])
     segments = np.array([data[c] for c in machine.segments])
@@ -163,6 +163,7 @@ def _move(
         rest_segments=segments[:, rest],
         components=machine.components,
         rest_angle=angle[rest],
+        means=means,
     )
 
 

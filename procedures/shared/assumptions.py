@@ -108,6 +108,8 @@ ANGLE_STEP = (
     "the encoder, 1.5 % of 12° together; a scale of 3 % is found.",
     "A controller with other gains of the angle than the plan's, or with another torque constant, gives another response: it "
     "is what was measured, and no finding.",
+    "A position sensor whose gain is off by more than its certificate says: 1 % of it is up to 1 % in peak and excess, where "
+    "the shaft moves along it. The loop holds the shaft by that sensor, and no other sees it.",
 )
 STEP = (
     "A set point that the controller scales is measured as the step that it makes: 1 % of it is 1 % of the step in "

@@ -31,13 +31,13 @@ def means(bump_s: float, phase: float, n: int = 60) -> Array:
 @settings(max_examples=40, deadline=None)
 @given(bump_s=st.floats(5e-3, 30e-3), phase=st.floats(0, 1))
 def test_a_peak_between_means_is_read_to_four_thousandths(bump_s: float, phase: float) -> None:
-    """Of 8 ms or more; the largest of a parabola through the means themselves is up to 2.7 % low there, 7 % at 5 ms. What a
+    """Of 9 ms or more; the largest of a parabola through the means themselves is up to 2 % low there, 7 % at 5 ms. What a
     shorter one is off, the curve of more samples tells."""
     found = excursion(means(bump_s, phase), np.zeros((2, 100)))
-    if bump_s > 8e-3:
+    if bump_s > 9e-3:
         assert found.peak == pytest.approx(10e-6, rel=0.004)
     assert found.towards == pytest.approx([0.0, -1.0])
-    assert abs(found.peak - 10e-6) < found.otherwise + 0.005 * 10e-6
+    assert abs(found.peak - 10e-6) < found.otherwise + 0.002 * 10e-6
     assert (found.away, found.floor) == (0.0, 0.0)
 
 
@@ -52,6 +52,15 @@ def test_a_curve_has_the_means_that_it_is_drawn_through() -> None:
         np.testing.assert_allclose(
             found, np.array([3 - 2 * places + 0.5 * places**2, 1 + places])[:, inside], rtol=1e-9
         )
+
+
+@settings(max_examples=30, deadline=None)
+@given(bump_s=st.floats(9e-3, 30e-3), phase=st.floats(0, 1))
+def test_readings_are_places_and_no_means(bump_s: float, phase: float) -> None:
+    """Where a rig file says `binding.samples = "reading"`; taken for means they would come out higher."""
+    angle = np.clip((np.arange(60) - 9.5 - phase) * SAMPLE / bump_s, 0, 1) * math.pi
+    found = excursion(np.array([np.zeros(60), -10e-6 * np.sin(angle)]), np.zeros((2, 100)), means=False)
+    assert found.peak == pytest.approx(10e-6, rel=0.004)
 
 
 def stepping(size: float, frequency: float, damping: float, late: float, noise: Array) -> Move:
