@@ -3,8 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 from bench import units
+from bench.question import Choice
+
+T = TypeVar("T")
+YES, NO, STOP = ("y", "yes"), ("n", "no"), ("stop", "abort", "quit")
+DONE = ("", *YES, "ok", "done")
 
 
 def after(said: str, what: str) -> str:
@@ -45,3 +53,13 @@ def reading_of(text: str, unit: str) -> float | None:
     if found is None or found.si != expected.si or not math.isfinite(value):
         return None
     return value * found.factor + found.offset
+
+
+@dataclass(frozen=True)
+class Other(Generic[T]):
+    """What a person may say that was done instead: how they say it, what makes something of their answer, and the buttons of a
+    page for it."""
+
+    more: str = ""
+    read: Callable[[str], T | None] = lambda _: None
+    choices: tuple[Choice, ...] = ()

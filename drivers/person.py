@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Generic, Literal, TypeVar
+from dataclasses import replace
+from typing import Literal, TypeVar
 
 from bench.clock import Clock
 from bench.errors import InterlockError, OperatorAbort
@@ -13,12 +13,10 @@ from bench.procedure.roles import NOTHING, Load, Plane, Push, Side
 from bench.question import CONSOLE, Answer, Choice, Question
 from bench.recording.recorder import Recorder
 from bench.rigfile.envelope import Envelope
-from drivers.answers import Misunderstood, after, degrees_of, reading_of, skipped, unknown
+from drivers.answers import DONE, NO, STOP, YES, Misunderstood, Other, after, degrees_of, reading_of, skipped, unknown
 from drivers.operator import LineOperator
 
 T = TypeVar("T")
-YES, NO, STOP = ("y", "yes"), ("n", "no"), ("stop", "abort", "quit")
-DONE = ("", *YES, "ok", "done")
 LANDED = "The shaft is landed and stands."
 CLEAR = "take tools and hands away"
 
@@ -82,7 +80,7 @@ class ConsoleOperator:
             f"The shaft levitates and stands. Turn it by hand until {degrees:g}° of its scale is at the mark; let it go.",
             "it stands there",
             angle_rad,
-            _Other("It stands at another angle: type its degrees.", degrees_of),
+            Other("It stands at another angle: type its degrees.", degrees_of),
         )
         if self._then is not None:
             self._then.turn(stands)
@@ -95,7 +93,7 @@ class ConsoleOperator:
             OperatorAbort: the person answered stop.
         """
         what = f"Mount the {part} on the shaft" if part else "Take the ring off the shaft"
-        self._confirmed(f"{what}.", "it sits" if part else "it is off", None, _Other())
+        self._confirmed(f"{what}.", "it sits" if part else "it is off", None, Other())
         if self._then is not None:
             self._then.mount(part)
 
@@ -114,7 +112,7 @@ class ConsoleOperator:
             f"scale; leave the other weights where they are; {CLEAR}.",
             "it sits tight",
             (mass_kg, angle_rad),
-            _Other(
+            Other(
                 f"Another weight or place: type its grams and degrees, as {mass_kg * 1e3:.3f} {degrees:.0f}.",
                 self._weight,
             ),
@@ -132,7 +130,7 @@ class ConsoleOperator:
         """
         self.may_touch()
         what = f"{LANDED} Take every weight that was fixed in the {plane} balancing plane off; {CLEAR}."
-        self._confirmed(what, "that is done", None, _Other())
+        self._confirmed(what, "that is done", None, Other())
         if self._then is not None:
             self._then.detach(plane)
 
@@ -148,7 +146,7 @@ class ConsoleOperator:
             return False
         self.may_touch()
         if way is None:
-            self._confirmed(f"Let go of the shaft; {CLEAR}.", "that is done", None, _Other())
+            self._confirmed(f"Let go of the shaft; {CLEAR}.", "that is done", None, Other())
             return self._then is None or self._then.push(None)
         degrees = math.degrees(way.angle_rad) % 360
         counts = f"{degrees:.0f}° from {way.zero}, counter-clockwise seen from outside the {way.end} end"
@@ -157,7 +155,7 @@ class ConsoleOperator:
             f"between its rings {way.axis} ({counts}) until it touches them there, one that lies with about as much as it "
             "weighs, and hold it there.",
             "it is held there", True,
-            _Other("To leave it out, as it was shown before: type skip.", skipped, (Choice("Leave it out", "skip"),)),
+            Other("To leave it out, as it was shown before: type skip.", skipped, (Choice("Leave it out", "skip"),)),
         )  # fmt: skip
         return done and (self._then is None or self._then.push(way))
 
@@ -180,7 +178,7 @@ class ConsoleOperator:
         """Ask for the load cells that hold the shaft to be wound past their place and back from that side, as `mount` asks."""
         what = (f"Wind the load cells slowly past their place, {'up' if side == 'above' else 'down'} along and around, "
                 f"and back to it from {side}: along first, around last.")  # fmt: skip
-        self._confirmed(what, "they are at their place", None, _Other())
+        self._confirmed(what, "they are at their place", None, Other())
         if self._then is not None:
             self._then.wind(side)
 
@@ -222,7 +220,7 @@ class ConsoleOperator:
             f"its label, as was {next(iter(self._envelope.rig.masses), '-')}."
         )
         when = "it hangs still" if load.label else "all is still"
-        return self._confirmed(f"{what}.", when, load, _Other(more, self._mass))
+        return self._confirmed(f"{what}.", when, load, Other(more, self._mass))
 
     def _mass(self, answer: str) -> Load | None:
         """The load of an answer, None where it names none. One that hung before is put into the recording, and asks again.
@@ -263,7 +261,7 @@ class ConsoleOperator:
             raise Misunderstood(f"{error}.") from error
         return grams * 1e-3, math.radians(degrees)
 
-    def _confirmed(self, what: str, when: str, asked: T, other: _Other[T]) -> T:
+    def _confirmed(self, what: str, when: str, asked: T, other: Other[T]) -> T:
         """Make sure that the machine may be touched, and ask until it is done as asked, or the person says what was done
         instead."""
         asks = after(self.approach() or self.standing(), what)
@@ -295,13 +293,3 @@ class ConsoleOperator:
         if answer.lower() in STOP:
             raise OperatorAbort(f"the operator answered {answer!r}")
         return answer.lower()
-
-
-@dataclass(frozen=True)
-class _Other(Generic[T]):
-    """What a person may say that was done instead: how they say it, what makes something of their answer, and the buttons of a
-    page for it."""
-
-    more: str = ""
-    read: Callable[[str], T | None] = lambda _: None
-    choices: tuple[Choice, ...] = ()

@@ -21,6 +21,7 @@ from bench.quantity import Measured, Quantity
 from bench.record.limits import Limit, Verdict, judge
 from bench.record.outcomes import Outcome
 from bench.record.setup import Setup
+from bench.record.sources import ContinuedRun, RecordingFile
 from bench.schema import STRICT, require_schema
 from bench.uncertainty import PROBABILITY, Estimate, Interval, budget, correlation_matrix, interval
 from bench.wholefile import write_whole
@@ -109,29 +110,6 @@ class FindingEntry:
     where: str
     effect: Effect
     concerns: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class RecordingFile:
-    """The recording's file name in the run directory and its digest, None if it was not taken."""
-
-    __pydantic_config__: ClassVar[ConfigDict] = STRICT
-    file: str
-    sha256: str | None
-
-
-@dataclass(frozen=True)
-class ContinuedRun:
-    """A stopped run whose completed steps this one's recording took over: its name, recording and digest of that, how many
-    steps, when it was started (ISO 8601, UTC), and by what it was `stopped`, a code of a finding or `killed`."""
-
-    __pydantic_config__: ClassVar[ConfigDict] = STRICT
-    run_id: str
-    file: str
-    sha256: str
-    steps: int
-    started: str
-    stopped: str
 
 
 @dataclass(frozen=True)

@@ -4,29 +4,21 @@ of the wrong kind, channels that are not there."""
 from __future__ import annotations
 
 import difflib
-import math
-from collections.abc import Callable, Iterator
-from contextlib import suppress
+from collections.abc import Iterator
 from datetime import date
-from itertools import combinations
 from typing import Any
 
 from bench import units
 from bench.errors import Problem
 from bench.rigfile.certificates import certified_numbers
+from bench.rigfile.check_places import contradictions
 from bench.rigfile.check_stages import encoders_of
 from bench.rigfile.elements import From, Of
 from bench.rigfile.model import RigFile
-from bench.rigfile.numbers import Sum, Term
 from bench.rigfile.placenames import places_named
 from bench.rigfile.places import CENTRE, PlaceError, Places
 from bench.rigfile.toleranced import Toleranced
 
-APART_M = 1e-3  # two bearings of a kind that are nearer are one, or a slip
-APART_RAD = math.radians(10)  # two axes of a bearing that are nearer leave a direction unheld
-STANDS_RAD = math.radians(1)  # from upright
-AGREE = 3.0  # standard uncertainties of a span and of the places that it lies between, and
-AGREE_M = 1e-4  # what a drawing is rounded to
 KINDS = {"at": "m", "by": "m", "gap": "m", "clearance": "m", "radius": "m", "length": "m", "offset": "m", "runout": "m",
          "centre_of_mass": "m", "ends": "m", "direction": "rad", "pull": "rad", "zero": "rad", "tilt": "rad",
          "up": "rad",
@@ -59,8 +51,7 @@ def _all(rig: RigFile) -> Iterator[Found]:
     yield from _aliases(rig)
     if rig.customer is not None and rig.laboratory is not None and rig.laboratory.customer:
         yield "laboratory.customer", rig.laboratory.customer, "[customer] alone, where there is one"
-    for contradictions in (_apart, _parallel, _upright, _ends, _spans, _rings):
-        yield from contradictions(rig, places)
+    yield from contradictions(rig, places)
 
 
 def _numbers(rig: RigFile, places: Places) -> Iterator[Found]:
@@ -210,103 +201,3 @@ def _day(text: str) -> date | None:
         return date.fromisoformat(text)
     except ValueError:
         return None
-
-
-def _told(look: Callable[[Any], Sum], part: Any) -> Sum | None:
-    """None where it cannot be told, which is told elsewhere."""
-    try:
-        return look(part)
-    except PlaceError:
-        return None
-
-
-def _apart(rig: RigFile, places: Places) -> Iterator[Found]:
-    """Two bearings of a kind are not in one place."""
-    told = [(n, b.kind, _told(places.place, f"bearings/{n}")) for n, b in rig.bearings.items() if b.at is not None]
-    placed = [(name, kind, at.value) for name, kind, at in told if at is not None]
-    for (one, kind, a), (other, another, b) in combinations(placed, 2):
-        if kind == another and abs(a - b) < APART_M:
-            yield f"bearings.{other}.at", f"{b * 1e3:g} mm, where {one} is", "a place of its own"
-
-
-def _parallel(rig: RigFile, places: Places) -> Iterator[Found]:
-    """The axes of a bearing look in different directions."""
-    for bearing, part in rig.bearings.items():
-        told = [(axis, _told(places.direction, f"bearings/{bearing}/{axis}")) for axis in part.axes]
-        for (one, a), (other, b) in combinations([(axis, d.value) for axis, d in told if d is not None], 2):
-            if abs(math.sin(a - b)) < math.sin(APART_RAD):
-                yield (f"bearings.{bearing}.axes.{other}.direction", f"{math.degrees(b):g}°, along {one}",
-                       f"an axis that is {math.degrees(APART_RAD):g}° or more from parallel")  # fmt: skip
-
-
-def _upright(rig: RigFile, places: Places) -> Iterator[Found]:
-    """Where directions do not count from up, the file says which of them is up, unless the shaft stands: then none is."""
-    if rig.shaft is None:
-        return
-    with suppress(PlaceError):
-        tilt = 0.0 if rig.shaft.tilt is None else places.number(rig.shaft.tilt, "shaft.tilt").number.value
-        stands = abs(math.cos(tilt)) < math.sin(STANDS_RAD)
-        if stands and rig.shaft.up is not None:
-            yield "shaft.up", "a direction on a shaft that stands", "none: `zero_at` says where directions have their 0"
-        if not stands and rig.shaft.up is None and rig.shaft.zero_at != "up":
-            yield ("shaft.zero_at", f"{rig.shaft.zero_at!r} on a shaft that does not stand",
-                   "`up` beside it: which direction, counted from there, is up")  # fmt: skip
-
-
-def _ends(rig: RigFile, places: Places) -> Iterator[Found]:
-    """Nothing is beyond the shaft's ends."""
-    if rig.shaft is None or rig.shaft.ends is None:
-        return
-    near, far = (_told(places.end, k) for k in (0, 1))
-    if near is None or far is None:
-        return
-    low, high = near.value, far.value
-    if low >= high:
-        yield "shaft.ends", f"{low * 1e3:g} to {high * 1e3:g} mm", "the near end first"
-        return
-    for part in dict.fromkeys((CENTRE, *places.parts)):
-        at = _told(places.place, part)
-        if at is not None and not low <= at.value <= high:
-            key = f"shaft.{CENTRE}" if part == CENTRE else f"{part.replace('/', '.')}.at"
-            yield key, f"{at.value * 1e3:g} mm, beyond the shaft", f"{low * 1e3:g} to {high * 1e3:g} mm"
-
-
-def _spans(rig: RigFile, places: Places) -> Iterator[Found]:
-    """A length that was measured between two parts agrees with their places."""
-    for identity, (one, other) in rig.spans.items():
-        a, b, span = _told(places.place, one), _told(places.place, other), places.known.get(identity)
-        if a is None or b is None or span is None:
-            continue
-        between = b - a
-        if between.terms and all(t.identity == identity for t in between.terms):
-            continue
-        spread = math.hypot(span.standard_uncertainty, *(t.number.standard_uncertainty for t in between.terms))
-        if abs(abs(between.value) - span.value) > AGREE * spread + AGREE_M:
-            lengths = " and ".join(t.identity for t in between.terms)
-            yield (_value_of(identity), f"{span.value * 1e3:g} mm", f"{abs(between.value) * 1e3:g} mm from {one} to {other}, "
-                   f"which {lengths} give, within their tolerances")  # fmt: skip
-
-
-def _rings(rig: RigFile, places: Places) -> Iterator[Found]:
-    """The rings catch the shaft before it strikes a magnet."""
-    stated = [(f"bearings.{n}.gap", b.gap) for n, b in rig.bearings.items() if b.kind == "radial" and b.gap is not None]
-    gaps = [t for key, gap in stated for t in _terms(places, gap, key)]
-    least = min(gaps, key=lambda gap: gap.number.value, default=None)
-    rings = {t.identity: t.number.value for n, r in rig.rings.items() if r.kind == "radial"
-             for t in _terms(places, r.clearance, f"rings.{n}.clearance")}  # fmt: skip
-    for identity, clearance in rings.items():
-        if least is not None and clearance >= least.number.value:
-            yield (_value_of(identity), f"{clearance:g} m",
-                   f"less than {least.identity} = {least.number.value:g} m, or the journal strikes the AMB first")  # fmt: skip
-
-
-def _terms(places: Places, stated: Toleranced | str, key: str) -> tuple[Term, ...]:
-    """The number, or nothing where there is none of that identity."""
-    try:
-        return (places.number(stated, key),)
-    except PlaceError:
-        return ()
-
-
-def _value_of(identity: str) -> str:
-    return f"{identity.replace('/', '.')}.value"

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from bench.errors import RecordingError
 from bench.findings import Effect, Finding
-from bench.record.records import ContinuedRun
+from bench.record.sources import ContinuedRun
 from bench.recording import Recording
 from bench.recording.earlier import CONTINUED
 

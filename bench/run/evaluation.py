@@ -20,18 +20,9 @@ from bench.procedure.names import quantities_on
 from bench.record.limited import limit_of, never_measured
 from bench.record.limits import Limit
 from bench.record.outcomes import SOUND, Outcome, outcome_of, unjudged
-from bench.record.records import (
-    ContinuedRun,
-    Correlations,
-    Measurement,
-    Record,
-    RecordingFile,
-    correlations_of,
-    findings_of,
-    measurement,
-    missing,
-)
+from bench.record.records import Correlations, Measurement, Record, correlations_of, findings_of, measurement, missing
 from bench.record.setup import Certified, certified_of
+from bench.record.sources import ContinuedRun, RecordingFile
 from bench.record.specs import applied, in_unit
 from bench.recording import Recording
 from bench.recording.recorder import Recorder

@@ -12,8 +12,9 @@ from bench import rundir
 from bench.errors import BenchError, ConfigError, RecordingError
 from bench.procedure import Procedure
 from bench.record.limits import Limit
-from bench.record.records import Record, RecordingFile, read_record, unfinished, write_record
+from bench.record.records import Record, read_record, unfinished, write_record
 from bench.record.setup import Setup, setup_of
+from bench.record.sources import RecordingFile
 from bench.recording import Recording
 from bench.run.evaluation import Ending, evaluate
 from bench.run.provenance import versions

@@ -23,8 +23,9 @@ from bench.findings import SIMULATED_CONTROLLER, Effect, Finding
 from bench.procedure import Procedure
 from bench.progress import Progress
 from bench.record.outcomes import Outcome, outcome_of
-from bench.record.records import Record, RecordingFile, findings_of, unfinished, write_record
+from bench.record.records import Record, findings_of, unfinished, write_record
 from bench.record.setup import setup_of
+from bench.record.sources import RecordingFile
 from bench.recording import Recording
 from bench.recording.reserve import reserved
 from bench.run import index, provenance, stopped

@@ -16,16 +16,15 @@ from bench.errors import AnalysisError, BenchError
 from bench.figures import Figure
 from bench.findings import Effect, Finding, Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.procedure.states import transition, within_reach
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from bench.rigfile.envelope import Envelope
 from procedures.actuator_constant import checks, estimates, ring
 from procedures.actuator_constant import figures as drawn
+from procedures.actuator_constant.asked import OBSERVER, adds, check, requires
 from procedures.actuator_constant.estimates import Result
 from procedures.actuator_constant.plan import Plan
 from procedures.actuator_constant.sines import (
@@ -39,11 +38,10 @@ from procedures.actuator_constant.sines import (
     start_s,
     with_the_ring,
 )
-from procedures.actuator_constant.steps import ADDED, SINE, STATE, channels, read_added, read_taken
-from procedures.position_loops.injection import BELOW, REFERENCE, ability, injected, parameters_of
-from procedures.position_loops.motors import around, motors, periods_of
+from procedures.actuator_constant.steps import ADDED, SINE, channels, read_added, read_taken
+from procedures.position_loops.injection import REFERENCE, ability, injected
+from procedures.position_loops.motors import around, motors
 from procedures.shared import assumptions
-from procedures.shared.rates import of_rate
 
 K_FORCE = Quantity("K_force", "N/A", "force of a motor along per ampere that gives it", title="force constant")
 K_TORQUE = Quantity("K_torque", "N m/A", "torque of a motor per ampere that gives it", title="torque constant")
@@ -58,7 +56,6 @@ INERTIA = Quantity("inertia", "kg m^2", "of what turns around an axis, by the ra
                    title="moment of inertia")  # fmt: skip
 MEASURES = (K_FORCE, K_TORQUE, K_OVER_J, RATIO, SLOPE, SLOPE_ANGLE, INERTIA)
 MARGIN_S = 1e-3  # of a capture
-OBSERVER = "observer"
 ZEROS = "encoder-zero"
 
 
@@ -75,12 +72,6 @@ def steps_on(rig: RigFile, plan: Plan) -> int:
         len(places(rig, plan, loop)) * plan.lines + 2 * plan.pairs * adds(rig, plan, loop) for loop in loops(rig, plan)
     )
     return bare + sum(len(places(rig, plan, loop)) * plan.lines for loop in with_the_ring(rig, plan))
-
-
-def adds(rig: RigFile, plan: Plan, loop: str) -> bool:
-    """Whether a current is added to one of two motors."""
-    driving = list(motors(rig, loop).values())
-    return plan.added_A > 0 and len(driving) == 2 and bool(driving[0].added)
 
 
 def needs(plan: Plan) -> tuple[Need, ...]:
@@ -185,91 +176,10 @@ def measured(results: Sequence[Result]) -> Iterator[Measured]:
                     yield quantity.measured(estimate, where)
 
 
-def check(rig: RigFile, plan: Plan) -> Iterable[str]:
-    """What cannot work before anything starts."""
-    can, known = ability(rig), tuple(dict.fromkeys(one.loop for one in rig.capabilities.force_currents.values()))
-    if unknown := [name for name in plan.amplitude if name not in known]:
-        yield f"amplitude: found {', '.join(unknown)}; motors are known along {', '.join(known)}"
-        return
-    if not loops(rig, plan):
-        yield f"loops: found {plan.loops!r}; motors are known along {', '.join(known)}"
-        return
-    observers = rig.capabilities.settings.get(OBSERVER, {})
-    if observers and plan.observer not in observers:
-        yield f"observer: found {plan.observer!r}; expected one of {', '.join(observers)}"
-    if unknown := [name for name in plan.parameters if name not in rig.parameters]:
-        yield f"parameters: found {', '.join(unknown)}; expected parameters of this rig"
-        return
-    if plan.high_hz > BELOW * rate(rig, plan) or plan.high_hz < 2 * plan.low_hz:
-        yield f"high_hz: found {plan.high_hz:g}; expected {2 * plan.low_hz:g} to {BELOW * rate(rig, plan):g}"
-    yield from of_rate(rig, plan.rate_hz)
-    envelope = Envelope(rig)
-    for loop in loops(rig, plan):
-        one = sine(rig, plan, loop, plan.high_hz)
-        yield from (
-            f"{loop}: {problem}"
-            for problem in envelope.problems_of(plan.parameters | parameters_of(can, REFERENCE, one))
-        )
-        for place in places(rig, plan, loop):
-            yield from (
-                f"{loop}, {place.name}: {problem}" for problem in envelope.problems_of({place.parameter: place.value})
-            )
-        if adds(rig, plan, loop):
-            parameter = next(iter(motors(rig, loop).values())).added
-            yield from (f"added_A: {problem}" for problem in envelope.problems_of({parameter: plan.added_A}))
-    if plan.added_inertia:
-        yield from _of_ring(rig, plan)
-
-
-def _of_ring(rig: RigFile, plan: Plan) -> Iterator[str]:
-    if not with_the_ring(rig, plan):
-        yield f"added_inertia: found true with loops = {plan.loops!r}; expected a loop around, all or around"
-    if missing := [name for name in (ring.RING, ring.RING_MASS) if name not in rig.machine]:
-        yield f"added_inertia: found true; machine: found no {', '.join(missing)}"
-    elif rig.machine[ring.RING_MASS].value > rig.envelope.max_hung_kg:
-        kg = rig.machine[ring.RING_MASS].value
-        yield f"added_inertia: found a ring of {kg:g} kg; expected {rig.envelope.max_hung_kg:g} kg at most (max_hung_kg)"
-    if not any("operator" in device.roles for device in rig.devices.values()):
-        yield "added_inertia: found true; devices: found none in the role operator, who mounts the ring"
-
-
 def figures(results: Sequence[Result], recording: Recording[Plan]) -> Iterable[Figure]:
     """The apparent constant of each line with the fit."""
     del recording
     return drawn.all_figures(results)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig has."""
-    can, driving = rig.capabilities.loop_injection, rig.capabilities.force_currents
-    wanted = ("loop_injection", "force_currents", "motion")
-    if can is None or not driving or rig.capabilities.motion is None:
-        return Requires(capabilities=wanted, capture=())
-    shown = tuple(dict.fromkeys(can.loops[one.loop].channel for one in driving.values()))
-    currents = tuple(one.current for one in driving.values())
-    coils = tuple(c for name in driving for c in rig.motors[name].currents)
-    return Requires(
-        channels=(*shown, *currents, STATE),
-        sensors=coils,
-        machine=periods_of(rig, "machine", driving),
-        geometry=periods_of(rig, "geometry", driving),
-        capabilities=wanted,
-        capture=(*shown, *currents, *coils, *([can.wave] if can.wave else [])),
-        lacks=tuple(_lacks(rig)),
-    )
-
-
-def _lacks(rig: RigFile) -> Iterator[str]:
-    can = ability(rig)
-    if REFERENCE not in can.places:
-        yield "capabilities.loop_injection.places: found no reference"
-    for loop in dict.fromkeys(one.loop for one in rig.capabilities.force_currents.values()):
-        if not can.loops[loop].inertia:
-            yield f"capabilities.loop_injection.loops.{loop}: found no inertia"
-        if len(motors(rig, loop)) > 2:
-            yield f"capabilities.force_currents: found {len(motors(rig, loop))} motors along {loop}; expected one or two"
-        if not places(rig, Plan.model_validate({}), loop):
-            yield f"capabilities.motion: {loop} is moved by none of its set points"
 
 
 def untold(rig: RigFile) -> tuple[Quantity, ...]:

@@ -26,8 +26,8 @@ from procedures.axis_breakaway.plan import Plan
 from procedures.axis_breakaway.sequence import INTEGRATORS, RADIUS, chosen, helix, loads, mass, pair, place, ramp
 from procedures.axis_breakaway.sequence import step_count as counted
 from procedures.axis_breakaway.steps import STATE, read_ramps
-from procedures.shared import assumptions
 from procedures.shared.default_masses import nth_lightest
+from procedures.stages import assumptions
 
 STICKS = "force at which it begins to move, raised slowly, mean of both ways"
 MEASURES = (

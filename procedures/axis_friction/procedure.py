@@ -39,8 +39,8 @@ from procedures.axis_friction.sequence import (
 )
 from procedures.axis_friction.sequence import step_count as counted
 from procedures.axis_friction.steps import STATE, read_passes
-from procedures.shared import assumptions
 from procedures.shared.default_masses import nth_lightest
+from procedures.stages import assumptions
 
 DRY = "friction at no speed, by a line over constant rates, mean of both ways"
 WET = "slope of friction over the rate, mean of both ways"

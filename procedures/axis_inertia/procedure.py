@@ -25,7 +25,7 @@ from procedures.axis_inertia.plan import Plan
 from procedures.axis_inertia.sequence import chosen, known, plays, tones
 from procedures.axis_inertia.sequence import step_count as counted
 from procedures.axis_inertia.steps import STATE, read_sines
-from procedures.shared import assumptions
+from procedures.stages import assumptions
 from procedures.stages.spread import middle, turns
 
 MASS = Quantity("mass", "kg", "of what moves along an axis, by the ratio to a part of known mass")

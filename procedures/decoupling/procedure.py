@@ -28,8 +28,7 @@ from procedures.decoupling import figures as drawn
 from procedures.decoupling.estimates import Result, coupling_of, excursion_of, named, ratio_of
 from procedures.decoupling.plan import Plan
 from procedures.decoupling.steps import ALONE, FAST, NUDGED, SLOW, SPARE_S, STATE, read_runs
-from procedures.shared import assumptions
-from procedures.stages import map_model
+from procedures.stages import assumptions, map_model
 from procedures.stages.pairs import lacks, pairs, played, silenced, sine, waits_at
 
 PLACE = Quantity("excursion", "m", "largest distance of the held axis from its set point, by its encoder")

@@ -29,8 +29,8 @@ from procedures.inductance_map.estimates import Result
 from procedures.inductance_map.places import Place, grid
 from procedures.inductance_map.plan import Plan
 from procedures.inductance_map.steps import PLACE, STATE, captured, read_taken
-from procedures.shared import assumptions
 from procedures.shared.rates import of_rate
+from procedures.stages import assumptions
 from procedures.stages.stators import POLES, Phase, axis, lacks, phases
 
 USUAL_HZ = 20e3

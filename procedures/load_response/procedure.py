@@ -30,8 +30,8 @@ from procedures.load_response.plan import Plan
 from procedures.load_response.sequence import INTEGRATORS, chosen, lead, masses
 from procedures.load_response.sequence import step_count as counted
 from procedures.load_response.steps import STATE, Change, read_changes, read_rests
-from procedures.shared import assumptions
 from procedures.shared.default_masses import by_weight
+from procedures.stages import assumptions
 from procedures.stages.known_loads import loaded, sources
 
 PER = "displacement per newton without integrators, mean of approaches from both sides, over loads both ways"

@@ -25,7 +25,7 @@ from procedures.map_zero.approaches import Approach, approaches, ramp
 from procedures.map_zero.estimates import Stator
 from procedures.map_zero.plan import Plan
 from procedures.map_zero.steps import LEVEL, STATE, read_rests
-from procedures.shared import assumptions
+from procedures.stages import assumptions
 from procedures.stages.stators import POLES, axis, lacks, phases
 
 ZERO = Quantity(

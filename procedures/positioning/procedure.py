@@ -31,7 +31,7 @@ from procedures.positioning.standard import FIGURES
 from procedures.positioning.steps import READ, READING, REST, STATE, read_taken
 from procedures.positioning.targets import UP, Approach, cycle, fewest
 from procedures.positioning.way import Tested, rates, readable, tested
-from procedures.shared import assumptions
+from procedures.stages import assumptions
 
 WORDS = {
     "A": ("bidirectional accuracy", "from the lowest mean - 2 s to the highest mean + 2 s, both ways"),

@@ -18,13 +18,12 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.stage import StageAxis
-from procedures.shared import assumptions
 from procedures.sine_following import checks, estimates
 from procedures.sine_following import figures as drawn
 from procedures.sine_following.estimates import LAG, LARGEST, RATIO, RMS, TRUE, Results
 from procedures.sine_following.plan import Plan
 from procedures.sine_following.steps import SINE, amplitude, modes_of, read
-from procedures.stages import tracks
+from procedures.stages import assumptions, tracks
 from procedures.stages.tracks import TOGETHER, Mode, chosen, sisters, waits_at
 
 MOST = sisters(LARGEST, "largest |place - set point| of a period, by the encoder's own scale, mean over periods")

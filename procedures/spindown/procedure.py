@@ -6,8 +6,7 @@ rotor, mean over both directions of turning: J_z w' = -B w - T_c sgn(w).
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from bench.figures import Figure
@@ -20,7 +19,6 @@ from bench.procedure.states import transition
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from bench.rigfile.roles import ANGLE
 from bench.uncertainty import Estimate
 from procedures.servomotor import carrying, hold, segments, wiring
 from procedures.servomotor.conventions import conventions
@@ -31,7 +29,7 @@ from procedures.spindown import figures as drawn
 from procedures.spindown.coasting import Coasted
 from procedures.spindown.estimates import Drag
 from procedures.spindown.plan import Plan
-from procedures.spindown.running_up import let_go, run_up
+from procedures.spindown.running_down import SLOW, run_down
 from procedures.spindown.steps import RunDown, channels, coils, read_run_downs
 
 B = Quantity("B", "N m s/rad", "viscous drag, mean over the directions that it was turned in")
@@ -42,9 +40,6 @@ T_C = Quantity("T_c", "N m", "Coulomb torque of the rotor alone, mean over the d
 J_Z = Quantity("J_z", "kg m^2", "polar inertia: by the ring where one was mounted, else the rig file's as used")
 MEASURES = (B, B_HIGH, T_C, J_Z)
 BY_SPEED, CARRIED = "by the speed channel", "motor carries"
-LEAD_S = 0.1  # of a run-up by the motor's torque current, before it is let go
-RAMP_S = 0.25  # what is left of the run-up's ramp when the speed is nearly there
-SLOW = (0.1, 0.15, 0.2, 0.25, 0.3)  # shares of the speed that the drive also holds: they tell its constant torque
 
 
 def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
@@ -90,7 +85,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
         for repeat in range(plan.repeats):
             for direction in (1, -1):
                 labels = {"group": group, "bias_A": bias, "direction": direction, "repeat": repeat, "by": by}
-                top = _run_down(rig, plan, record, labels, top)
+                top = run_down(rig, plan, record, labels, top)
                 if not top:
                     return
     if plan.motor_carries:
@@ -123,56 +118,6 @@ def _at_rest(rig: Rig, plan: Plan, bias: float, part: str) -> None:
     transition(rig, RigState.LEVITATED)
     if plan.motor_carries:
         carrying.carry(rig, plan.settle_s)
-
-
-def _run_down(rig: Rig, plan: Plan, record: Recorder, labels: Mapping[str, object], top: float) -> float:
-    """Run up to `top`, hold it, let go and wait for the end speed. The speed it was let go from; 0 if that was not reached."""
-    direction, by = 1 if labels["direction"] == 1 else -1, str(labels["by"])
-    wanted = direction * top
-    if by == "drive" and labels["group"] == "low" and labels["repeat"] == 0:
-        _hold_slowly(rig, plan, record, labels, wanted)
-    reached = run_up(rig, wanted, by)
-    if not reached:
-        record.event("not-reached", wanted=wanted, reached=rig.rotation.speed_rad_s, by=by)
-        let_go(rig, by)
-        rig.rotation.stop()
-        return 0.0
-    if reached != wanted:
-        record.event(checks.LOWERED, wanted=wanted, held=reached, bias_A=labels["bias_A"])
-    rig.clock.sleep(RAMP_S)
-    with record.step("spin", speed_rad_s=reached, **labels):
-        rig.clock.sleep(plan.steady_s)
-    if plan.motor_carries:
-        _wait_for(rig, direction, 2 * math.pi * int(str(labels["repeat"])) / plan.repeats)
-    if by == "drive":
-        let_go(rig, by)
-    with record.step("coast", ring=labels["group"] == "ring", **labels):
-        if by == "motor":  # a link's answers take as long as a short run-down: its currents say when it was let go
-            rig.clock.sleep(LEAD_S)
-            let_go(rig, by)
-        begun = rig.clock.now_ns()
-        rig.clock.sleep(plan.start_delay_s + 0.5)
-        while direction * rig.rotation.speed_rad_s > plan.end_speed_rad_s:
-            if rig.clock.now_ns() - begun > plan.coast_s * 1e9:
-                break
-            rig.clock.sleep(0.05)
-    rig.rotation.stop()  # the speed reference that SPIN set is gone before the gains come back
-    return abs(reached)
-
-
-def _wait_for(rig: Rig, direction: int, place: float) -> None:
-    """Until the turning rotor comes to a place, rad within a turn, as exactly as a link's answers allow: what goes round with
-    it acts the other way where a run-down begins half a turn later, so that repeats spread over a turn are free of it."""
-    ahead = direction * (place - rig.levitation.reading(ANGLE)) % (2 * math.pi)
-    rig.clock.sleep(ahead / max(abs(rig.rotation.speed_rad_s), 1.0))
-
-
-def _hold_slowly(rig: Rig, plan: Plan, record: Recorder, labels: Mapping[str, object], wanted: float) -> None:
-    for share in SLOW:
-        if reached := run_up(rig, share * wanted, "drive"):
-            rig.clock.sleep(RAMP_S)
-            with record.step("spin", speed_rad_s=reached, **labels):
-                rig.clock.sleep(plan.steady_s)
 
 
 @dataclass(frozen=True)

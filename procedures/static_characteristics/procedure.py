@@ -23,7 +23,7 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
-from procedures.shared import assumptions
+from procedures.stages import assumptions
 from procedures.stages.stators import POLES, axis, lacks, phases
 from procedures.static_characteristics import checks, estimates
 from procedures.static_characteristics import figures as drawn

@@ -18,8 +18,7 @@ from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from procedures.shared import assumptions
-from procedures.stages import tracks
+from procedures.stages import assumptions, tracks
 from procedures.stages.tracks import Mode, chosen, sisters, waits_at
 from procedures.step_following import checks, estimates
 from procedures.step_following import figures as drawn

@@ -16,7 +16,8 @@ from bench.findings import Effect, Finding
 from bench.history.compare import Side, compare
 from bench.history.differ import differing
 from bench.record.outcomes import Outcome
-from bench.record.records import ContinuedRun, findings_of
+from bench.record.records import findings_of
+from bench.record.sources import ContinuedRun
 from bench.uncertainty import Influence
 
 
