@@ -196,8 +196,8 @@ GATE_MARGIN = (
     "The mover at rest: while it moves it reads more, which a mission tells, and the catch has less to spare by as much.",
     "The force constant that the controller reckons with is the stated one: one that is 1 % greater makes the bearings' limit, "
     "in amperes, and so every catch margin 1 % less.",
-    "The magnets' pull is the stated one, or by pole = \"calibration\" measured for both planes together: a plane whose pull is "
-    "1 % greater is held 1 % less far, and its catch margin is told greater than it is by that.",
+    "The magnets' pull is the stated one, or by the plan's `pole` what both planes have together: a plane whose pull is 1 % "
+    "greater is held 1 % less far, and its catch margin is told greater than it is by that.",
     "Planes that are caught one by one, by forces that come at once. A loop that answers late needs some of it: of a nominal "
     "machine whose force holds 69.9 µm, releases from rest are caught up to 64 to 66 µm.",
 )

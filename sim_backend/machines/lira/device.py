@@ -9,16 +9,10 @@ from typing import Final
 
 from sim_backend.core.plant import Array
 from sim_backend.machines.lira.captures import Captures
-from sim_backend.machines.lira.plant import DQ, FAULTS, POSITION_TICKS, STATES, TICKS_S, WHOLE, Plant
-from sim_backend.machines.lira.settings import (
-    AXES_OF_LINE,
-    BY_NAME,
-    LONGEST_HOLD_S,
-    LONGEST_STEP_S,
-    MEASUREMENTS,
-    SETTINGS,
-)
+from sim_backend.machines.lira.plant import FAULTS, POSITION_TICKS, STATES, TICKS_S, WHOLE, Plant
+from sim_backend.machines.lira.settings import AXES_OF_LINE, BY_NAME, LONGEST_HOLD_S, MEASUREMENTS, SETTINGS
 from sim_backend.machines.lira.shell import PROMPT, Refused, Shell, number, single
+from sim_backend.machines.lira.steps import Steps
 from sim_backend.machines.lira.streamed import Streamed
 
 RATES: Final = (115_200, 921_600, 3_000_000)
@@ -50,7 +44,7 @@ class Device:
         self._rows: Array = plant.run(1 / 35000, whole=True)
         self._told = (plant.state, plant.fault)
         self._holding = False
-        self._ends: dict[str, int] = {}  # ticks of the machine at which steps end by themselves
+        self._steps = Steps(plant)
         self._captures = Captures()
         self.streamed = Streamed()
         """Slow telemetry: blocks that wait to be sent."""
@@ -81,7 +75,7 @@ class Device:
         while left > 0:
             if self._unsure is not None and self.plant.tick >= self._unsure:
                 self.baud, self._unsure = RATES[0], None
-            ticks = min(left, TICKS_S // 1000, self._ended())
+            ticks = min(left, TICKS_S // 1000, self._steps.ended())
             capture = self._captures.running
             at = self.tick
             every = capture.every if capture else POSITION_TICKS
@@ -95,19 +89,12 @@ class Device:
             left -= ticks
         return self.shell.told()
 
-    def _ended(self) -> int:
-        """Take steps away whose time is over; ticks until that of the next one is, for steps of whole readings of positions."""
-        for name in [name for name, at in self._ends.items() if at <= self.plant.tick]:
-            self.plant.step(name, 0.0)
-            del self._ends[name]
-        return min(self._ends.values(), default=self.plant.tick + TICKS_S) - self.plant.tick
-
     def restart(self, why: str) -> bytes:
         """As after power-on: OFF, with the settings that were saved, nothing captured, nothing streamed, a person's line. The
         machine goes on as it is, without currents; what the firmware says."""
         self.plant.power_on()
         self._started = self.plant.tick
-        self._ends.clear()
+        self._steps.forget()
         self._put(self._saved)
         later, self.shell = self.shell.later, Shell(self)
         self.shell.later = later
@@ -251,20 +238,9 @@ class Device:
         return [f"{words[0]}={value:.9g}"]
 
     def _step(self, *words: str) -> Iterable[str]:
-        """Until it is another, or for so long by the firmware's own ticks."""
-        if len(words) not in (2, 3) or words[0] not in DQ:
-            raise Refused(2, "system amperes [seconds]")
-        amperes, seconds = number(words[1]), number(words[2]) if len(words) > 2 else 0.0
-        if not -5 <= amperes <= 5 or not 0 <= seconds <= LONGEST_STEP_S:
-            raise Refused(3, f"-5..5 A 0..{LONGEST_STEP_S:g} s")
-        if self.plant.state not in ("CURRENT", "LEVITATED"):
-            raise Refused(4, f"state={self.plant.state}")
-        self._ends.pop(words[0], None)
-        if seconds:
-            self._ends[words[0]] = self.plant.tick + max(round(seconds * TICKS_S) // POSITION_TICKS, 1) * POSITION_TICKS
-        self.plant.step(words[0], amperes)
+        told = self._steps.do(*words)
         self._captures.stepped()
-        return [f"{words[0]}={amperes:.9g} A"]
+        return told
 
     def _inj(self, *words: str) -> Iterable[str]:
         if words == ("off",):
