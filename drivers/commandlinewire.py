@@ -4,32 +4,31 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
-from bench.errors import ConfigError, LinkError
+from bench.errors import ConfigError
 from bench.link import LinkStats
 from bench.link.codec import places_of
 from bench.link.commandstream import CommandStream
 from bench.link.frames import FrameBatch
 from bench.rigfile import RigFile
-from bench.rigfile.commandline import CommandLine
-from bench.wire.commandline import Line, Reply, Splitter, read_line, request
+from drivers import linerate
 from drivers.beat import WriterSpec
 from drivers.byteport import BytePort
 
-ANSWER_S = 0.4  # for a line at a rate that may be the wrong one
-RATE_TAG = 9999
-
 
 class CommandLineWire:
-    """Implements drivers.wires.Wire on a byte stream."""
+    """Implements drivers.wires.Wire on a byte stream; `rate` Bd was agreed on with a controller that begins at another."""
 
-    def __init__(self, port: BytePort, rig: RigFile, now_ns: Callable[[], int]) -> None:
+    def __init__(self, port: BytePort, rig: RigFile, now_ns: Callable[[], int], rate: int | None = None) -> None:
         self._port, self._rig, self._now_ns = port, rig, now_ns
         self._stream = CommandStream(rig)
         self._writing = threading.Lock()
+        self._told = 0
         self._say: Callable[[bytes], None] = self._write
         self.stats = LinkStats()
+        lines = rig.commandline
+        self._rate = None if rate is None or lines is None else linerate.Rate(self._at, lines, rate, time.monotonic())
         self._write(self._stream.opening())
 
     @property
@@ -41,13 +40,27 @@ class CommandLineWire:
         """As Wire says."""
         data = self._port.read(timeout_s)
         batch = self._stream.feed(data, self._now_ns())
+        s, c = self.stats, self._stream.counts
+        if self._rate is not None:
+            self._look(self._rate, data, bool(len(batch)) or c.told != self._told)
         if due := self._stream.due():
             self._say(due)
-        s, c = self.stats, self._stream.counts
         s.received += len(batch)
         s.octets += len(data)
         s.malformed, s.crc_errors = c.dropped, c.damaged
         return batch
+
+    def _look(self, rate: linerate.Rate, data: bytes, understood: bool) -> None:
+        """See whether both ends are at one rate, and go on with a controller that had to be brought back to it."""
+        found, self._told = rate.found, self._stream.counts.told
+        if due := rate.look(data, understood, time.monotonic()):
+            self._say(due)
+        if rate.found > found:
+            self._stream.begin_anew()
+            self.stats.reconnects += 1
+
+    def _at(self, rate: int) -> None:
+        self._port.serial.baudrate = rate
 
     def write(self, batch: FrameBatch) -> None:
         """As Wire says."""
@@ -100,38 +113,10 @@ def speak(port: BytePort, wanted: int | None, name: str, rig: RigFile, now_ns: C
     try:
         if lines is None:
             raise ConfigError(f"link {name}: a cli: link needs the table [commandline] in the rig file; found none")
-        if port.serial is not None and wanted is not None and lines.baudrate_first not in (None, wanted):
-            _agree(port, name, lines, wanted)
-        return CommandLineWire(port, rig, now_ns)
+        if port.serial is None or wanted is None or lines.baudrate_first in (None, wanted):
+            return CommandLineWire(port, rig, now_ns)
+        linerate.agree(port, name, lines, wanted)
+        return CommandLineWire(port, rig, now_ns, wanted)
     except BaseException:
         port.close()
         raise
-
-
-def _agree(port: BytePort, name: str, lines: CommandLine, wanted: int) -> None:
-    """Bring both ends to a rate: that of the last session, or the one of power-up."""
-    ask = lines.commands.get("IDENTIFY", "")
-    if _answered(port, lines, ask.split()):
-        return
-    port.serial.baudrate = lines.baudrate_first
-    if not _answered(port, lines, lines.baudrate_line.format(baudrate=wanted).split()):
-        raise ConfigError(
-            f"link {name}: no answer at {wanted} Bd nor at {lines.baudrate_first} Bd, or the rate is refused. Next: is the "
-            "controller on, at rest (it changes its rate only then), and the port the right one?"
-        )
-    port.serial.baudrate = wanted
-
-
-def _answered(port: BytePort, lines: CommandLine, words: Sequence[str]) -> bool:
-    """Whether a line is answered with ok in time; what is no line of its answer is left out."""
-    splitter, until = Splitter(), time.monotonic() + ANSWER_S
-    try:
-        port.write(b"\n\n" + request(RATE_TAG, *words))
-        while (left := until - time.monotonic()) > 0:
-            for piece in splitter.feed(port.read(left)):
-                said = read_line(piece.text, lines.prompt) if isinstance(piece, Line) else None
-                if isinstance(said, Reply) and said.tag == RATE_TAG:
-                    return said.kind == "ok"
-    except LinkError:
-        return False
-    return False

@@ -37,6 +37,7 @@ class Counts:
     damaged: int = 0  # blocks whose CRC is not theirs, or that cannot be a message
     events: int = 0
     restarts: int = 0
+    told: int = 0  # replies, events and blocks that are what they should be
 
 
 class CommandStream:
@@ -75,6 +76,11 @@ class CommandStream:
         lines = [request(self._next(), *line.split()) for line in self._lines.opening]
         self._echoes = {line.decode("ascii").strip() for line in lines}
         return b"\n\n" + b"".join(lines)
+
+    def begin_anew(self) -> None:
+        """The controller has restarted, by what somebody else heard: the opening is due."""
+        with self._lock:
+            self._restarted(True)
 
     def due(self) -> bytes:
         """What is to be said unasked, once: the opening, after a restart."""
@@ -137,6 +143,7 @@ class CommandStream:
 
     def _text(self, text: str) -> list[tuple[int, bytes, int]]:
         found = read_line(text, self._lines.prompt)
+        self.counts.told += found is not None
         if isinstance(found, Event):
             self.counts.events += 1
             _log.info("%d: %s %s", found.tick, found.name, found.text)

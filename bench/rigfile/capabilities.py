@@ -258,6 +258,7 @@ def _of_coils(found: CoilMap) -> Iterator[tuple[str, str | Mapping[str, str]]]:
         yield from ((f"coil_map.systems.{name}.{key}", getattr(system, key)) for key in ("d", "q", "zero"))
     for axis, values in found.still.items():
         yield f"coil_map.still.{axis}", {name: name for name in values}
+    yield "coil_map.lasts", found.lasts
 
 
 def _of_axes(can: Positioning) -> Iterator[tuple[str, str | Mapping[str, str]]]:

@@ -36,12 +36,14 @@ class CoilSystem(Part):
 class CoilMap(Part):
     """Coils of a winding: the current `systems` by name; by coil the channel of the current of the half-bridge that drives it,
     `bridges`; `stars` of coils whose currents have no other way. `still` are by axis the values of parameters at which the
-    controller does not hold it, so that what flows is what it was told."""
+    controller does not hold it, so that what flows is what it was told. `lasts`: the parameter that says after how many
+    seconds, by its own clock, the controller takes what is added to a reference away again, 0: never; "": it cannot."""
 
     systems: Mapping[Name, CoilSystem] = Field(min_length=1)
     bridges: Mapping[str, str] = {}
     stars: tuple[tuple[str, ...], ...] = ()
     still: Mapping[str, Mapping[str, float]] = {}
+    lasts: str = ""
 
     @property
     def coils(self) -> tuple[str, ...]:

@@ -31,6 +31,10 @@ from procedures.coil_map.steps import (
 )
 
 FAR = "far"  # event: the mover went too far, and the run ended there
+MORE, OVER = (
+    4,
+    1.5,
+)  # times what a capture has to spare that the next attempt has at least, and times what this one took too long
 
 
 @contextmanager
@@ -49,6 +53,8 @@ def let_go(rig: Rig, can: CoilMap) -> Iterator[None]:
 
 
 def _end(rig: Rig, can: CoilMap, before: Mapping[str, float]) -> None:
+    if can.lasts:
+        rig.levitation.write({can.lasts: 0.0})
     for system in can.systems.values():
         rig.levitation.write({system.d: 0.0, system.q: 0.0})
     transition(rig, RigState.OFF)
@@ -76,18 +82,25 @@ def moved(rig: Rig, plan: Plan, record: Recorder) -> None:
     where it lay. Where torques along q turn the mover as they should it is held against turning meanwhile."""
     can = ability(rig.file)
     with let_go(rig, can):
+        if can.lasts:
+            rig.levitation.write({can.lasts: plan.hold_s})
         rig.clock.sleep(plan.settle_s)
         lay = {axis: rig.levitation.reading(axis) for axis in can.axes}
         seen: list[Pulse] = []
+        spare_s, tries = plan.spare_s, plan.tries
         for number, (name, way, size, repeat) in enumerate(pulses(can, plan)):
             labels = {"number": number, "system": name, "way": way, "size_A": size, "repeat": repeat}
-            seen += [one for one in [_pulse(rig, plan, record, labels)] if one is not None]
+            one, spare_s = _pulse(rig, plan, record, labels, spare_s, tries)
+            tries = plan.tries if one is not None else 1  # where no current flows, more time brings none
+            seen += [] if one is None else [one]
             if _too_far(rig, plan, record, lay):
                 return
         if not seen or any(
             f.effect is Effect.ERROR for f in checks.of_currents(estimates.evaluate(seen, {}, rig.file), plan)
         ):
             return
+        if can.lasts:
+            rig.levitation.write({can.lasts: 0.0})
         up, alone = turns_right(can, seen, plan)
         if up:
             hold(rig, can)
@@ -105,24 +118,43 @@ def turns_right(can: CoilMap, seen: Sequence[Pulse], plan: Plan) -> tuple[bool, 
     return up, all(abs(by[n, "d"]) <= checks.ALONG * abs(by[n, "q"]) for n in torques)
 
 
-def _pulse(rig: Rig, plan: Plan, record: Recorder, labels: dict[str, Any]) -> Pulse | None:
-    """One pulse in one capture; what it shows."""
+def _pulse(
+    rig: Rig, plan: Plan, record: Recorder, labels: dict[str, Any], spare_s: float, tries: int
+) -> tuple[Pulse | None, float]:
+    """One pulse whole in one capture; taken again, with more to spare, where a slow host or line left part of it outside: by as
+    much as it was late, for each attempt pushes the mover on. What it shows, and what the next one has to spare."""
+    first_s = spare_s
+    for attempt in range(tries):
+        one, took_s = _captured(rig, plan, record, labels | {"attempt": attempt}, spare_s)
+        if one is not None:
+            return one, spare_s
+        spare_s = max(MORE * spare_s, OVER * (took_s - 2 * plan.lead_s - plan.hold_s))
+    return None, first_s
+
+
+def _captured(
+    rig: Rig, plan: Plan, record: Recorder, labels: dict[str, Any], spare_s: float
+) -> tuple[Pulse | None, float]:
+    """One pulse in one capture; what it shows, if all of it is there, and how long the host took for it, s. Its end is told as
+    well where the controller knows it: that is late, and says that nothing is added any more."""
     assert rig.capture is not None
     can = ability(rig.file)
     name = str(labels["system"])
     system = can.systems[name]
     parameter = system.d if labels["way"] == "d" else system.q
-    lasts = 2 * plan.lead_s + plan.hold_s + plan.spare_s
+    lasts = 2 * plan.lead_s + plan.hold_s + spare_s
     with record.step(PULSE, **labels):
         rig.capture.arm(captured(can, name, int(labels["repeat"])), seconds=lasts, rate_hz=rig.capture.rate_hz / SLOWER)
+        begun = rig.clock.now_ns()
         rig.clock.sleep(plan.lead_s)
         rig.levitation.write({parameter: float(labels["size_A"])})
         rig.clock.sleep(plan.hold_s)
         rig.levitation.write({parameter: 0.0})
+        took_s = (rig.clock.now_ns() - begun) * 1e-9
         rig.capture.wait(lasts + 5.0)
-    data = rig.capture.upload(None, number=labels["number"])
+    data = rig.capture.upload(None, number=labels["number"], attempt=labels["attempt"])
     rig.clock.sleep(plan.calm_s)
-    return pulse_of(rig.file, plan, labels, data.columns, data.rate_hz)
+    return pulse_of(rig.file, plan, labels, data.columns, data.rate_hz), took_s
 
 
 def _around(rig: Rig, plan: Plan, record: Recorder, name: str, lay: Mapping[str, float], with_torque: bool) -> bool:

@@ -17,6 +17,7 @@ class Plan(BenchPlan):
     lead_s: float = Field(4e-3, ge=2e-3)  # from the start of a capture to the pulse at least
     hold_s: float = Field(15e-3, ge=10e-3)  # a pulse
     spare_s: float = Field(5e-3, ge=0)  # of a capture, for what two writes take on their way
+    tries: int = Field(4, ge=1, le=10)  # of a pulse that is not whole in its capture, each with more to spare
     rest_s: float = Field(6e-3, ge=1e-3)  # from a pulse's edge until its current rests
     settle_s: float = Field(1.0, ge=0)  # before all: the mover rocks in its rings when it is taken hold of
     calm_s: float = Field(0.05, ge=0)  # between two pulses

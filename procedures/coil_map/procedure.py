@@ -77,6 +77,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
             if size > rig.parameters[parameter].high or -size < rig.parameters[parameter].low:
                 yield f"{name}: found {size:g} A; {parameter} is {rig.parameters[parameter].low:g} to " \
                       f"{rig.parameters[parameter].high:g} A"  # fmt: skip
+    if can.lasts and plan.hold_s > rig.parameters[can.lasts].high:
+        yield f"hold_s: found {plan.hold_s:g} s; {can.lasts} is at most {rig.parameters[can.lasts].high:g} s"
     if plan.rest_s > plan.hold_s / 2:
         yield f"rest_s: found {plan.rest_s:g} s; expected half of hold_s, {plan.hold_s / 2:g} s, or less"
 
@@ -91,7 +93,7 @@ def requires(rig: RigFile) -> Requires:
     return Requires(
         channels=can.axes,
         sensors=can.coils,
-        parameters=tuple(name for s in systems for name in (s.d, s.q)),
+        parameters=(*(name for s in systems for name in (s.d, s.q)), *((can.lasts,) if can.lasts else ())),
         capture=tuple(dict.fromkeys((*can.coils, *can.bridges.values(), *read, *can.axes))),
         capabilities=("coil_map",),
     )

@@ -22,6 +22,7 @@ PULSE, TOUR = "pulse", "tour"
 WAYS = ("d", "q")
 SLOWER = 8  # ticks from sample to sample of a capture: those at which positions are read
 LEAST = 20  # samples of a pulse that rests, to be worth a mean
+END_S = 2e-3  # at the end of a pulse, over which the mover's place is averaged
 STEPPED = 0.2  # of what a pulse should have in its coils, at least
 
 
@@ -114,13 +115,13 @@ def captured(can: CoilMap, name: str, repeat: int) -> tuple[str, ...]:
 
 
 def read_pulses(recording: Recording[Plan]) -> list[Pulse]:
-    """All pulses in which a current flowed, in time order."""
+    """All pulses in which a current flowed and that are whole in their capture, in time order."""
     found = (_pulse(recording, step) for step in recording.steps(PULSE))
     return [one for one in found if one is not None]
 
 
 def _pulse(recording: Recording[Plan], step: Step) -> Pulse | None:
-    found = recording.captures(number=step.labels["number"])
+    found = recording.captures(**{k: step.labels[k] for k in ("number", "attempt") if k in step.labels})
     if not found:
         return None
     names = captured(ability(recording.rig), str(step.labels["system"]), int(step.labels["repeat"]))
@@ -128,7 +129,7 @@ def _pulse(recording: Recording[Plan], step: Step) -> Pulse | None:
 
 
 def pulse_of(rig: RigFile, plan: Plan, labels: Mapping[str, Any], x: Mapping[str, Array], rate: float) -> Pulse | None:
-    """What a capture shows of a pulse; nothing where no current flowed, or where too little of it was captured."""
+    """What a capture shows of a pulse; nothing where no current flowed, or where it is not whole in it."""
     can, name, way = ability(rig), str(labels["system"]), str(labels["way"])
     system, size, repeat = can.systems[name], float(labels["size_A"]), int(labels["repeat"])
     span = _span(np.array([x[c] for c in system.coils]), abs(size), round(plan.lead_s / 2 * rate), rate, plan)
@@ -158,17 +159,21 @@ def pulse_of(rig: RigFile, plan: Plan, labels: Mapping[str, Any], x: Mapping[str
 
 
 def _span(coils: Array, size: float, lead: int, rate: float, plan: Plan) -> tuple[slice, slice, slice] | None:
-    """Where it was before a pulse, where its current rested, and its end; nothing where no current flowed or it has no room."""
+    """Where it was before a pulse, where its current rested, and its end, `hold_s` after its edge by the capture's own clock: a
+    host that takes the current away later pushes the mover on, and that is no part of it. Nothing where no current flowed, or
+    where the capture does not hold so much of it."""
     change = np.sqrt(((coils - coils[:, :lead].mean(axis=1, keepdims=True)) ** 2).sum(axis=0))
     top = float(change.max())
     if top < STEPPED * size:
         return None
     on = np.flatnonzero(change > 0.5 * top)
     first, last = int(on[0]), int(on[-1])
-    guard, rest = round(1e-3 * rate), round(plan.rest_s * rate)
-    if first <= guard + 2 or last - first - rest < LEAST:
+    guard, rest, end = round(1e-3 * rate), round(plan.rest_s * rate), round(END_S * rate)
+    whole = first + round(plan.hold_s * rate)
+    if first <= guard + 2 or last < max(whole - end, first + rest + LEAST):
         return None
-    return slice(0, first - guard), slice(first + rest, last), slice(max(last - round(2e-3 * rate), first), last)
+    last = min(last, whole)
+    return slice(0, first - guard), slice(first + rest, last), slice(max(last - end, first), last)
 
 
 def read_tours(recording: Recording[Plan]) -> dict[str, Tour]:

@@ -168,6 +168,17 @@ def test_a_capture_about_a_step(host: Host) -> None:
     assert np.std(left) == pytest.approx(NOISE_A, rel=0.05)
 
 
+def test_a_step_that_ends_by_itself(host: Host) -> None:
+    """5 ms of the program's own ticks, whatever its host does meanwhile."""
+    host.say("on current", "hb 1")
+    stat, data = captured(host, f"{1 << 53:x} 280000 4000 100 step", "hb 2", "step q_R1 -4 0.005")
+    n = np.arange(4000) - stat["trigger"] + 1
+    begun, over = (np.where(n > at, law(np.maximum(n - at, 0) / TICKS_S), 0.0) for at in (0, 1400))
+    left = np.frombuffer(data, "<i2") * 4e-4 + 4 * (begun - over)
+    assert np.std(left) == pytest.approx(NOISE_A, rel=0.05)
+    assert host.asked("90 step q_R1 1 1.5").startswith("90 err 3")
+
+
 def test_a_part_of_a_capture(host: Host) -> None:
     _, data = captured(host, "3ffffffffffff 35000 200 10 now")
     host.blocks.clear()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,17 +13,20 @@ import pytest
 
 from bench.cli.motion_truth import truth_of_motion
 from bench.cli.virtual import Simulated, simulated_run
+from bench.clock import Clock
 from bench.findings import Effect, Finding
 from bench.procedure import Measured
+from bench.procedure.rig import Rig
+from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile, load_rig
 from bench.rigfile.check_capabilities import problems_of
 from bench.uncertainty import interval
-from procedures.coil_map import decode, winding
+from procedures.coil_map import decode, moving, winding
 from procedures.coil_map.bowl import Bowl, fitted, rest_of
 from procedures.coil_map.estimates import asked
 from procedures.coil_map.plan import Plan
 from procedures.coil_map.procedure import check, procedure
-from procedures.coil_map.steps import ability, pulses
+from procedures.coil_map.steps import ability, pulse_of, pulses
 from reports.figures import draw as draw_figure
 from sim_backend.machines.lira.plant import coils as of_machine
 
@@ -211,3 +215,50 @@ def test_a_table_that_leads_nowhere_is_told(old: str, new: str, key: str, expect
     assert toml.count(old) == 1
     found = [str(p) for p in problems_of(RigFile.parse(toml.replace(old, new), dbc))]
     assert any(f"capabilities.coil_map.{key}" in line and expected in line for line in found), found
+
+
+class Late:
+    """The clock of a host that comes 40 ms late out of every sleep."""
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+
+    def now_ns(self) -> int:
+        return self._clock.now_ns()
+
+    def sleep(self, seconds: float) -> None:
+        self._clock.sleep(seconds + 0.04)
+
+
+def test_a_host_that_is_late_moves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The controller ends each pulse; those that miss their capture are taken again."""
+
+    def late(rig: Rig, plan: Plan, record: Recorder) -> None:
+        moving.moved(replace(rig, clock=Late(rig.clock)), plan, record)
+
+    monkeypatch.setattr("procedures.coil_map.procedure.procedure", replace(procedure, acquire=late))
+    done = run(tmp_path, {"reduced": 1.0})
+    assert wrong(done).keys() == {"current-sensors-disagree"}  # the reduced machine has no half-bridges
+    taken = {(s.labels["number"], s.labels["attempt"]) for s in done.recording.steps("pulse")}
+    assert {attempt for number, attempt in taken if number == 0} == {0, 1}
+    assert {attempt for number, attempt in taken if number > 0} == {0}
+
+
+def test_a_pulse_is_as_long_as_it_was_meant() -> None:
+    """One that is held on moves the mover on: by the capture's clock it is over; one that its capture cuts is none."""
+    rig, plan, rate = load_rig("lira"), Plan(), 35_000.0
+    labels = {"system": "R1", "way": "q", "size_A": 1.4, "repeat": 1}
+
+    def shown(seconds: float, held_s: float) -> float | None:
+        t = np.arange(round(seconds * rate)) / rate
+        on, system = (t >= 5e-3) & (t < 5e-3 + held_s), CAN.systems["R1"]
+        x = {c: on * 1.4 * winding.of_way(system, "q", np.zeros(1))[c][0] for c in system.coils}
+        x |= {system.read_d: 0 * t, system.read_q: 1.4 * on, **dict.fromkeys(CAN.axes, 0 * t)}
+        x["gamma"] = np.cumsum(on) / rate  # 1 rad/s for as long as it is pushed
+        one = pulse_of(rig, plan, labels, x, rate)
+        return None if one is None else one.moved["gamma"]
+
+    assert shown(0.1, plan.hold_s) == pytest.approx(plan.hold_s - 1e-3, abs=1e-4)
+    assert shown(0.1, 0.08) == pytest.approx(plan.hold_s - 1e-3, abs=1e-4)
+    assert shown(0.1, 0.01) is None
+    assert shown(0.015, 0.08) is None

@@ -164,6 +164,36 @@ def test_a_step_captured_at_280_kHz_has_its_rise() -> None:
     assert rise_s(rows) == pytest.approx(0.107e-3, rel=0.1)  # at 400 V: less time at the limit
 
 
+@pytest.mark.parametrize("amperes", [1.5, -1.5])
+def test_a_step_that_says_how_long_it_lasts_ends_by_the_firmwares_ticks(amperes: float) -> None:
+    """15 ms of 35 kHz, however long the host says nothing; a step without a time stays, and so does one with 0."""
+    host = Host(locked=1.0)
+    host.ask("on", "current")
+    host.wait(0.02)
+    names = [m.name for m in MEASUREMENTS]
+    mask = sum(1 << names.index(f"i_s{n}") for n in range(1, 7))
+
+    def steps(*words: str) -> int:
+        assert host.ask("cap", "arm", f"{mask:x}", "35000", "2000", "10", "step").kind == "ok"
+        host.wait(0.02)
+        assert host.ask("step", "d_R1", *words).kind == "ok"
+        host.blocks.clear()
+        host.wait(0.08)
+        host.ask("cap", "read", "0", "24000")
+        data = b"".join(b.data for b in sorted(host.blocks, key=lambda b: b.offset))
+        first = np.frombuffer(data, "<i2").reshape(-1, 6)[:, 0] * 7.3e-3
+        host.ask("step", "d_R1", "0")
+        return int((first * np.sign(amperes) > 0.75).sum())
+
+    assert steps(f"{amperes}", "0.015") == pytest.approx(
+        525, abs=3
+    )  # the edges of both ends cancel but for their samples
+    assert steps(f"{amperes}", "0") > 1900
+    assert steps(f"{amperes}") > 1900
+    assert host.ask("step", "d_R1", "1", "1.1").text.startswith("3 range -5..5 A 0..1 s")
+    assert host.ask("step", "d_R1", "1", "-0.1").kind == "err"
+
+
 def test_blocks_that_are_missing_are_read_again() -> None:
     host = Host()
     host.ask("cap", "arm", "ff", "35000", "1000", "0", "now")

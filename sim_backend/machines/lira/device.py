@@ -9,12 +9,15 @@ from typing import Final
 
 from sim_backend.core.plant import Array
 from sim_backend.machines.lira.captures import Captures
-from sim_backend.machines.lira.plant import DQ, FAULTS, POSITION_TICKS, STATES, TICKS_S, WHOLE, Plant
+from sim_backend.machines.lira.plant import FAULTS, POSITION_TICKS, STATES, TICKS_S, WHOLE, Plant
 from sim_backend.machines.lira.settings import AXES_OF_LINE, BY_NAME, LONGEST_HOLD_S, MEASUREMENTS, SETTINGS
 from sim_backend.machines.lira.shell import PROMPT, Refused, Shell, number, single
+from sim_backend.machines.lira.steps import Steps
 from sim_backend.machines.lira.streamed import Streamed
 
 RATES: Final = (115_200, 921_600, 3_000_000)
+UNSURE_S: Final = 2.0
+"""How long it stays at a new rate at which it hears nothing."""
 RESTING: Final = ("OFF", "IDLE")
 AT_ONCE: Final = ("lift", "land", "stop", "clear", "safe")
 BANNER: Final = "lira firmware 1.0"
@@ -35,11 +38,13 @@ class Device:
         self.plant = plant
         self.shell = Shell(self)
         self.baud = RATES[0]
+        self._unsure: int | None = None  # tick of the machine at which a rate is given up
         self._serial = serial
         self._started, self._beat = 0, ""
         self._rows: Array = plant.run(1 / 35000, whole=True)
         self._told = (plant.state, plant.fault)
         self._holding = False
+        self._steps = Steps(plant)
         self._captures = Captures()
         self.streamed = Streamed()
         """Slow telemetry: blocks that wait to be sent."""
@@ -68,7 +73,9 @@ class Device:
         """Let time pass; the events of it."""
         left = round(seconds * TICKS_S) // POSITION_TICKS * POSITION_TICKS
         while left > 0:
-            ticks = min(left, TICKS_S // 1000)
+            if self._unsure is not None and self.plant.tick >= self._unsure:
+                self.baud, self._unsure = RATES[0], None
+            ticks = min(left, TICKS_S // 1000, self._steps.ended())
             capture = self._captures.running
             at = self.tick
             every = capture.every if capture else POSITION_TICKS
@@ -87,12 +94,13 @@ class Device:
         machine goes on as it is, without currents; what the firmware says."""
         self.plant.power_on()
         self._started = self.plant.tick
+        self._steps.forget()
         self._put(self._saved)
         later, self.shell = self.shell.later, Shell(self)
         self.shell.later = later
         if later is not None:
             later.clear()
-        self.baud = RATES[0]
+        self.baud, self._unsure = RATES[0], None
         self._captures.forget()
         self.streamed.end()
         self._told = (self.plant.state, self.plant.fault)
@@ -105,6 +113,7 @@ class Device:
         Raises:
             Refused: it cannot be done; with its code.
         """
+        self._unsure = None
         verb = self._verbs.get(words[0])
         if verb is None:
             raise Refused(1, words[0])
@@ -229,16 +238,9 @@ class Device:
         return [f"{words[0]}={value:.9g}"]
 
     def _step(self, *words: str) -> Iterable[str]:
-        if len(words) != 2 or words[0] not in DQ:
-            raise Refused(2, "system amperes")
-        amperes = number(words[1])
-        if not -5 <= amperes <= 5:
-            raise Refused(3, "-5..5 A")
-        if self.plant.state not in ("CURRENT", "LEVITATED"):
-            raise Refused(4, f"state={self.plant.state}")
-        self.plant.step(words[0], amperes)
+        told = self._steps.do(*words)
         self._captures.stepped()
-        return [f"{words[0]}={amperes:.9g} A"]
+        return told
 
     def _inj(self, *words: str) -> Iterable[str]:
         if words == ("off",):
@@ -290,4 +292,5 @@ class Device:
         if len(words) != 1 or not words[0].isdigit() or int(words[0]) not in RATES:
             raise Refused(2, "|".join(map(str, RATES)))
         self.baud = int(words[0])
+        self._unsure = self.plant.tick + round(UNSURE_S * TICKS_S)
         return [words[0]]

@@ -16,7 +16,7 @@ from sim_backend.machines.lira.defects import DEFECTS, ELECTRICAL, FACTORS, OPEN
 from sim_backend.machines.lira.operator import Attendant
 from sim_backend.machines.lira.params import COILS, ControlParams, Each, PlantParams
 from sim_backend.machines.lira.plant import DQ, TICKS_S, Plant
-from sim_backend.machines.lira.settings import BY_NAME, HELD, INJECTED, LONGEST_HOLD_S
+from sim_backend.machines.lira.settings import BY_NAME, HELD, INJECTED, LONGEST_HOLD_S, STEPPED
 from sim_backend.machines.lira.truth_cogging import cogging
 from sim_backend.machines.lira.truth_constants import constants
 from sim_backend.machines.lira.truth_current_step import currents
@@ -272,7 +272,7 @@ LIRA = Machine(
     copper_W=copper_W,
     operator=operator,
     daily=DAILY,
-    controls=frozenset((*BY_NAME, *INJECTED, *HELD)) | SENT | {f"step_{name}" for name in DQ},
+    controls=frozenset((*BY_NAME, *INJECTED, *HELD, STEPPED)) | SENT | {f"step_{name}" for name in DQ},
     tick_s=1 / TICKS_S,
     period_s=PERIOD_S,
     motions=Motions(

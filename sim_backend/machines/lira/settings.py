@@ -68,6 +68,9 @@ SETTINGS: Final = (
 INJECTED: Final = ("inject_axis", "inject_place", "inject_amplitude", "inject_hz")
 """What the line's `inj` says, by the names that rig files may have for it."""
 LONGEST_HOLD_S: Final = 6e-3
+LONGEST_STEP_S: Final = 1.0
+STEPPED: Final = "step_s"
+"""How long a step of its `step` lasts, likewise; 0: until another."""
 HELD: Final = ("hold_across", "hold_A", "hold_s")
 """What its `hold` says, likewise."""
 BY_NAME: Final = {s.name: s for s in SETTINGS}

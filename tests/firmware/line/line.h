@@ -19,6 +19,7 @@ extern uint64_t tick, watchdog; /* ticks; the second: without a heartbeat */
 extern enum state state;
 extern int fault; /* as telemetry has it: 0 none, 4 HEARTBEAT_LOST */
 extern double step_of[CURRENTS];  /* A, added to each current's reference */
+extern uint64_t step_ends[CURRENTS]; /* tick from which on it is 0 again */
 extern struct move moves[6];      /* x1 x2 y1 y2 z gamma: m, rad */
 extern const char *const state_names[7], *const axis_names[6], *const fault_names[5];
 void plant_start(void);

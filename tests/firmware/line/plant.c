@@ -19,6 +19,7 @@ uint64_t tick, watchdog = TICKS * 80 / 1000;
 int fault;
 enum state state = OFF;
 double step_of[CURRENTS];
+uint64_t step_ends[CURRENTS];
 struct move moves[6];
 
 static struct { double value, rate; } current[CURRENTS];
@@ -116,6 +117,7 @@ void plant_to(uint64_t target)
     while (tick < target) {
         tick++;
         for (int k = 0; k < CURRENTS; k++) {
+            if (tick > step_ends[k]) step_of[k] = 0;
             double reference = state < CURRENT || state == FAULT ? 0 : step_of[k] + (state == LIFT || state == LEVITATED ? carrying[k] : 0);
             double y = current[k].value - reference, v = current[k].rate;
             current[k].value = reference + yy * y + yv * v;

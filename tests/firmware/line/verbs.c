@@ -173,15 +173,16 @@ static void ref(int n, char **a)
 static void step(int n, char **a)
 {
     char name[12] = "i_";
-    double value;
-    if (n == 2) strncat(name, a[0], 8);
-    int k = n == 2 ? channel_named(name) - 52 : -1;
+    double value, seconds = 0;
+    if (n == 2 || n == 3) strncat(name, a[0], 8);
+    int k = n == 2 || n == 3 ? channel_named(name) - 52 : -1;
     if (k >= CURRENTS) k = -1;
-    if (k < 0 || !number_of(a[1], &value)) fail(ARGUMENTS, "d_R1..q_L AMPERES");
-    else if (value < -5 || value > 5) fail(RANGE, "%s -5..5", a[0]);
+    if (k < 0 || !number_of(a[1], &value) || (n == 3 && !number_of(a[2], &seconds))) fail(ARGUMENTS, "d_R1..q_L AMPERES [SECONDS]");
+    else if (value < -5 || value > 5 || seconds < 0 || seconds > 1) fail(RANGE, "%s -5..5 0..1", a[0]);
     else if (state != CURRENT && state != LEVITATED) wrong_state();
     else {
         step_of[k] = value;
+        step_ends[k] = seconds > 0 ? tick + (uint64_t)(seconds * TICKS + 0.5) : UINT64_MAX;
         capture_step();
         ok("%s=%.9g A", a[0], value);
     }
