@@ -9,7 +9,18 @@ import numpy as np
 
 from bench.rigfile.stage import StageAxis
 from bench.uncertainty import Estimate, Influence
-from procedures.stages.counts import BOUND, averaged, edges, erred, half_count, pitch_of, rested, rounded, stretched
+from procedures.stages.counts import (
+    BOUND,
+    RECTANGLE,
+    averaged,
+    edges,
+    erred,
+    half_count,
+    pitch_of,
+    rested,
+    rounded,
+    stretched,
+)
 from procedures.stages.tracks import Mode, named, where_of, without
 from procedures.step_following.fit import Stepped, began, stepped
 from procedures.step_following.plan import Plan
@@ -90,12 +101,17 @@ def _of_group(g: Group, plan: Plan) -> Mapping[tuple[str, str], Estimate]:
 
 
 def _time(g: Group) -> Estimate:
-    """Settling: where the rate changes by no more than itself from edge to edge of a count, the place is up to an eighth of
-    that time off its straight line; the edges are passed between two samples."""
-    times = [f.settled for f in g.found if f.settled is not None]
-    slope, share = float(np.mean([f.slope for f in g.found])), averaged(times)
+    """Settling: all times that parabolas tell are alike likely; at half a count a sample they are. Where none was asked, edges
+    are passed between two samples, and where the rate changes by no more than itself from edge to edge of a count, the place is
+    up to an eighth of that time off its straight line."""
+    found = [f.settling for f in g.found if f.settling is not None]
+    slope, within = (float(np.mean([getattr(s, what) for s in found])) for what in ("slope", "within"))
+    share = averaged([s.at for s in found])
     off = rounded(f"{TIME}/{g.where}", g.axis, EVEN * half_count(g.axis) * share)
-    period = float(np.median(np.diff(g.moves[0].track.t)))
-    told = Influence(f"sampling/{g.where}", "between two samples", share * period / 2 / BOUND, "s", "B", "normal")
-    turned = Estimate(float(np.mean(times)), "s", {i: c * slope for i, c in off.sensitivities.items()})
+    known, what = f"sampling/{g.where}", "between two samples"
+    if all(s.passed for s in found):
+        told = Influence(known, what, share * within / RECTANGLE, "s", "B", "rectangular")
+    else:
+        told = Influence(known, what, share * within / BOUND, "s", "B", "normal")
+    turned = Estimate(float(np.mean([s.at for s in found])), "s", {i: c * slope for i, c in off.sensitivities.items()})
     return turned + Estimate.of(0.0, told)

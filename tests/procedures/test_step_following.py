@@ -77,13 +77,32 @@ def test_settling_is_not_early_where_the_band_is_whole_counts(band_counts: float
     found = shaped(place, 0.0, step)
     true = 0.05 + (1000 - band_counts) * 4e-3
     assert found.settled == pytest.approx(true, abs=2.1e-3 + 0.5e-3)
-    assert found.slope * COUNT / 2 == pytest.approx(2e-3, abs=0.51e-3)
+    assert found.settling.slope * COUNT / 2 == pytest.approx(2e-3, abs=0.51e-3)
     errors = []
     for shift in np.linspace(0, 1, 21):
         place = np.minimum(-1000 * COUNT + rate * (t - 0.05) + shift * COUNT, -3 * COUNT)
         errors.append(shaped(place, 0.0, step).settled - (true - shift * 4e-3))
     assert abs(float(np.mean(errors))) < 0.6e-3
-    assert max(map(abs, errors)) <= found.slope * COUNT / 2 + 0.5e-3
+    assert max(map(abs, errors)) <= found.settling.slope * COUNT / 2 + 0.5e-3
+
+
+@pytest.mark.parametrize("rate", [0.5, 0.72, 1.6])  # counts a sample
+def test_settling_of_what_goes_by_is_known_to_a_part_of_a_sample(rate: float) -> None:
+    """Places that slow down evenly, anywhere in a count and between samples: off by no more than is said, mostly by much less;
+    by the edges of two counts a slower one would be off by up to a sample."""
+    t, errors, bounds = np.arange(400) * 1e-3, [], []
+    for phase in np.random.default_rng(5).random(60):
+        at = 0.2 + 1e-3 * phase
+        s = np.minimum(t - at, 0.08)
+        place = -(400.25 - rate * 1e3 * s + 0.5 * rate * 1e4 * s * s)  # half of its rate is left at most after 50 ms
+        found = settling(t, np.round(place + 7 * phase) - 7 * phase, 400.25, 1.0)
+        assert found is not None
+        assert found.passed
+        errors.append(found.at - at)
+        bounds.append(found.within)
+    assert (np.abs(errors) <= np.array(bounds) * (1 + 1e-6)).all()
+    assert 0.25 < np.std(np.array(errors) / bounds) < 3**-0.5 + 0.05  # no wider than a rectangle
+    assert np.mean(bounds) < 0.3e-3 / rate
 
 
 def test_along_the_step_beyond_is_positive() -> None:
