@@ -27,9 +27,9 @@ types: setup
 	nice $(BIN)/mypy
 	nice $(BIN)/lint-imports
 
-# Two workers wait for links in real time, two compute (tests/groups.py). Only files with long tests are read.
+# Two workers wait for links in real time, one computes (tests/groups.py). Only files with long tests are read.
 ci-long: setup
-	$(BIN)/python -m pytest -q -m "long and not links" -n 4 --dist loadgroup --durations=60 --durations-min=10 \
+	$(BIN)/python -m pytest -q -m "long and not links" -n 3 --dist loadgroup --durations=60 --durations-min=10 \
 	    $$(grep -rlE "mark\.(long|faults)" tests --include="test_*.py")
 
 faults: setup

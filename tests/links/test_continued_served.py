@@ -10,12 +10,8 @@ import pytest
 from bench.recording import Recording
 from bench.recording.earlier import AGAIN
 
-PLAN = (
-    "angles=1",
-    "rounds=8",
-    "settle_s=0.3",
-    "average_s=0.2",
-)  # noise alone drifts 1.7 of the 2 mA allowed within 0.1 s
+# Noise alone makes readings of 0.1 s drift by up to 1.7 of the 2 mA allowed.
+PLAN = ("angles=1", "rounds=8", "settle_s=0.3", "average_s=0.2")
 KILLED_AT = 60
 NEARLY_DONE = f"step {KILLED_AT + 1}/72"
 
