@@ -9,7 +9,7 @@ READY := .venv/.ready
 # Tests start hundreds of processes: without its bytecode every one of them would compile the project again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test check types format ci-long faults links browser pictures fuzz campaigns plants sound moved golden former bench clean lock setup wheel site gallery
+.PHONY: demo test check format ci-long faults links browser pictures fuzz campaigns plants sound moved golden former bench clean lock setup wheel site gallery
 
 demo: setup
 	$(BIN)/bench run amb-calibration --rig tsbs12 --seed 1
@@ -20,16 +20,13 @@ test: setup
 check: setup
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
-	$(MAKE) -j 2 types test
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(MAKE) test
 
-# Beside the tests, of which the first wait in real time.
-types: setup
-	nice $(BIN)/mypy
-	nice $(BIN)/lint-imports
-
-# Two workers wait for links in real time, one computes (tests/groups.py). Only files with long tests are read.
+# One worker waits for links in real time first, the other computes (tests/groups.py). Only files with long tests are read.
 ci-long: setup
-	$(BIN)/python -m pytest -q -m "long and not links" -n 3 --dist loadgroup --durations=60 --durations-min=10 \
+	$(BIN)/python -m pytest -q -m "long and not links" -n 2 --dist loadgroup --durations=60 --durations-min=10 \
 	    $$(grep -rlE "mark\.(long|faults)" tests --include="test_*.py")
 
 faults: setup

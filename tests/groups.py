@@ -9,14 +9,13 @@ from __future__ import annotations
 import os
 from typing import Any
 
-REAL_TIME = ("real-time", "real-time links")
+REAL_TIME = "real-time"
 GROUPS = {
-    # Their processes keep up with wall time, and mostly wait: two groups, each of which goes through its tests one by one.
-    "real-time": ("tests/firmware/", "tests/cli/test_serve.py", "tests/drivers/test_heartbeat",
-                  "tests/drivers/test_live_link.py", "tests/drivers/test_fieldbus_live.py",
-                  "test_docs.py::test_commands_work[serve-a-rig]", "test_docs.py::test_commands_work[connect-a-rig]",
-                  "test_docs.py::test_commands_work[add-a-device]"),
-    "real-time links": ("tests/links/",),
+    # Their processes keep up with wall time, and mostly wait: one after the other, for two at once were too many beside others.
+    REAL_TIME: ("tests/links/", "tests/firmware/", "tests/cli/test_serve.py", "tests/drivers/test_heartbeat",
+                "tests/drivers/test_live_link.py", "tests/drivers/test_fieldbus_live.py",
+                "test_docs.py::test_commands_work[serve-a-rig]", "test_docs.py::test_commands_work[connect-a-rig]",
+                "test_docs.py::test_commands_work[add-a-device]"),
     # They begin with the same calibrations, which are made once.
     "identified": ("tests/procedures/test_amb_calibration.py", "tests/procedures/test_amb_facts.py",
                    "tests/procedures/test_force_constant.py", "tests/procedures/test_force_coupling.py",
@@ -32,7 +31,7 @@ GROUPS = {
 PAGES = "tests/test_docs.py::test_commands_work"
 """Long tests of one file that share nothing: each goes to whichever worker is free."""
 
-FIRST = (*REAL_TIME, f"{PAGES}[loop-response]", "tests/test_described.py", "tests/test_machines.py",
+FIRST = (REAL_TIME, f"{PAGES}[loop-response]", "tests/test_described.py", "tests/test_machines.py",
          "tests/procedures/test_maximum_speed.py", "tests/procedures/test_coverage_long.py",
          "tests/procedures/test_moved_long.py", "tests/procedures/test_bearing_constant.py",
          "tests/procedures/test_load_response_run.py")  # fmt: skip
@@ -64,6 +63,6 @@ def scheduler(config: Any, log: Any) -> Any:
 
 def give_way(nodeid: str) -> None:
     """Before a test on a worker among several: what only computes lets those go first that must keep up with wall time. There
-    is no way back for this worker, which is why their groups are handed out before all others."""
-    if "PYTEST_XDIST_WORKER" in os.environ and hasattr(os, "nice") and group_of(nodeid) not in REAL_TIME:
+    is no way back for this worker, which is why their group is handed out before all others."""
+    if "PYTEST_XDIST_WORKER" in os.environ and hasattr(os, "nice") and group_of(nodeid) != REAL_TIME:
         os.nice(max(NICE - os.nice(0), 0))
