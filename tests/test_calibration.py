@@ -29,8 +29,6 @@ from bench.calibration.lookup import Lookup
 from bench.calibration.store import Store, base_of, stores_of
 from bench.errors import ConfigError
 from bench.rigfile import RigFile, load_rig
-from bench.rigfile.certificates import certified_numbers
-from bench.rigfile.toleranced import Toleranced
 from bench.run.adoption import refuse_other_rig
 from bench.uncertainty import Estimate, Influence, correlation
 
@@ -189,41 +187,6 @@ def test_only_what_a_run_invents_gets_its_name_in_front() -> None:
     names = {i.id: i.name for i in values["a"].sensitivities}
     assert names["run-a/scatter/1"] == "scatter [run-a]"
     assert values["a"].u == pytest.approx((K + Estimate.of(0.0, older)).u)
-
-
-def test_numbers_of_any_table_of_the_rig_file_keep_their_identity_and_what_a_run_makes_of_them_does_not() -> None:
-    """An encoder's pitch, in its unit and as a share, a hook's place and a load cell's gain; not a part of an error, a bound
-    where the number is exact, another distribution, or a scatter of the same name: those are a run's own."""
-    pitch, error = (Toleranced(value=v, unit="m", half_width=h, distribution="rectangular", source="C")
-                    for v, h in ((2e-6, 6e-11), (0.0, 1e-6)))  # fmt: skip
-    stated = {
-        "encoders/x/pitch": pitch,
-        "encoders/x/error": error,
-        "hooks/near/at": pitch,
-        "capabilities/cell/gain": pitch,
-    }
-    of = lambda i, u, *rest: Influence(i, "", u, "m", *(rest or ("B", "rectangular")))  # type: ignore[arg-type]  # noqa: E731
-    u = pitch.standard_uncertainty
-    ours = [of("encoders/x/pitch", u / 2e-6), of("hooks/near/at", u), of("capabilities/cell/gain", u)]
-    own = [of("encoders/x/error/sine", error.standard_uncertainty / math.sqrt(2)), of("hooks/far/at", u)]
-    (facts,) = adopted({"a": Estimate(1.0, "m", dict.fromkeys([*ours, *own], 1.0))}, "run-a", (), stated).values()
-    assert [i.id for i in facts.sensitivities] == [*(i.id for i in ours), *(f"run-a/{i.id}" for i in own)]
-    for other in (
-        of("hooks/near/at", 1e-9),
-        of("hooks/near/at", u, "B", "normal"),
-        of("hooks/near/at", u, "A", "rectangular"),
-    ):
-        (facts,) = adopted({"a": Estimate(1.0, "m", {other: 1.0})}, "run-a", (), stated).values()
-        assert [i.id for i in facts.sensitivities] == ["run-a/hooks/near/at"]
-
-
-def test_a_run_is_adopted_with_the_identities_of_its_own_rig_file() -> None:
-    """The scale of a stage's encoder, as its rig file has it: its certificate is kept with the calibration too."""
-    rig = load_rig("rlsrm")
-    (identity,) = (i for i in certified_numbers(rig) if i == "encoders/x/pitch")
-    number = certified_numbers(rig)[identity]
-    kept = certificates_of(rig, [identity, "encoders/x/pitch/2", "encoders/none/pitch"])
-    assert [(i, c.value, c.u) for i, c in kept.items()] == [(identity, number.value, number.standard_uncertainty)]
 
 
 def test_a_gain_used_twice_cancels_and_scatter_does_not() -> None:

@@ -23,7 +23,6 @@ from bench.campaign.model import (
 )
 from bench.procedure import Measured, Quantity
 from bench.record.records import Record, measurement, unfinished
-from bench.record.setup import Certified, Setup
 from bench.uncertainty import Estimate, Influence, correlation_matrix
 
 D1, D2 = "first-20260101T000000Z-aaaa", "second-20260101T000100Z-bbbb"
@@ -65,11 +64,6 @@ def test_identities_follow_the_rule_of_adoption() -> None:
     assert identity("geometry/amb_span", made) == "geometry/amb_span"
     assert identity("scatter/1", made) == f"{D2}/scatter/1"
     assert identity(f"{D1}/scatter/1", made) == f"{D1}/scatter/1"
-    assert (
-        identity("encoders/x/pitch", made) == f"{D2}/encoders/x/pitch"
-    )  # an old record does not say that it is the rig's
-    stated = Setup("0" * 64, "", {}, {}, {"encoders/x/pitch": Certified(2e-6, 1e-9, "m", "rectangular", "C")})
-    assert identity("encoders/x/pitch", dataclasses.replace(made, setup=stated)) == "encoders/x/pitch"
 
 
 def test_a_constant_of_two_degrees_of_freedom_has_its_interval_alone() -> None:

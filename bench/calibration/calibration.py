@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Collection, Container, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, date, datetime, timedelta
 from typing import Any, ClassVar, Literal
@@ -17,7 +17,6 @@ from typing import Any, ClassVar, Literal
 from pydantic import ConfigDict
 
 from bench.rigfile import RigFile
-from bench.rigfile.certificates import certified_numbers
 from bench.rigfile.toleranced import Toleranced
 from bench.schema import STRICT
 from bench.uncertainty import Estimate, Influence
@@ -26,7 +25,7 @@ Backend = Literal["sim", "live", "served"]  # served: a live link with a simulat
 State = Literal["current", "expired"]
 CLOCKS_DIFFER = timedelta(minutes=1)  # at most: the clock of the run's host, and of the one that uses it
 RIG_TABLES = ("site", "geometry", "masses", "sensors", "machine", "hook")
-"""First parts of the identities of influences that stand in the rig file, whatever else is known of it."""
+"""First parts of the identities of influences that stand in the rig file."""
 
 
 @dataclass(frozen=True)
@@ -132,26 +131,20 @@ class Calibration:
         return dataclasses.replace(self, expired=self.overdue(now))
 
 
-def of_the_rig(identity: str, numbers: Container[str] = ()) -> bool:
-    """Whether an influence stands in the rig file, so that it is the same in every run: by its table, or as one of the
-    `numbers` that the file is known to have (a scale, where a hook is, a load cell's gain)."""
-    return identity.partition("/")[0] in RIG_TABLES or identity in numbers
+def of_the_rig(identity: str) -> bool:
+    """Whether an influence stands in the rig file, so that it is the same in every run."""
+    return identity.partition("/")[0] in RIG_TABLES
 
 
-def adopted(
-    values: Mapping[str, Estimate],
-    run_id: str,
-    known: Collection[str] = (),
-    numbers: Mapping[str, Toleranced] | None = None,
-) -> dict[str, Estimate]:
+def adopted(values: Mapping[str, Estimate], run_id: str, known: Collection[str] = ()) -> dict[str, Estimate]:
     """Values as facts: influences of this run alone get the identity `<run_id>/...` and say in their name whose they are.
 
-    `known` are the identities that came with the calibrations that the run used: they keep theirs, and so do the `numbers` of
-    the rig file that are as uncertain as that says. A value that is not linear in its influences is kept with its linear part.
+    `known` are the identities that came with the calibrations that the run used: they keep theirs. A value that is not linear
+    in its influences is kept with its linear part.
     """
 
     def renamed(influence: Influence) -> Influence:
-        if of_the_rig(influence.id) or influence.id in known or _states(numbers or {}, influence):
+        if of_the_rig(influence.id) or influence.id in known:
             return influence
         return dataclasses.replace(influence, id=f"{run_id}/{influence.id}", name=f"{influence.name} [{run_id}]")
 
@@ -159,17 +152,6 @@ def adopted(
         name: Estimate(e.value, e.unit, {renamed(i): c for i, c in e.sensitivities.items() if c * i.u != 0})
         for name, e in values.items()
     }
-
-
-def _states(numbers: Mapping[str, Toleranced], influence: Influence) -> bool:
-    """Whether the rig file states this very influence, in its unit or as a share. What a run makes of a number (a part of it, a
-    bound where it is exact) is another influence: no two may have one identity in one budget."""
-    number = numbers.get(influence.id)
-    if number is None or (influence.kind, influence.distribution) != ("B", number.distribution):
-        return False
-    u = number.standard_uncertainty
-    stated = (u, u / abs(number.value)) if number.value else (u,)
-    return math.isinf(influence.dof) and any(math.isclose(influence.u, s, rel_tol=1e-9) for s in stated)
 
 
 def certificate(rig: RigFile, identity: str) -> Certificate | None:
@@ -187,8 +169,6 @@ def certificate(rig: RigFile, identity: str) -> Certificate | None:
         found = getattr(rig.sensors.get(name), part, None)
     elif table in ("geometry", "masses", "machine"):
         found = (getattr(rig, table, None) or {}).get(name)
-    else:
-        found = certified_numbers(rig).get(identity)
     if not isinstance(found, Toleranced):
         return None
     return Certificate(found.value, found.standard_uncertainty, found.unit, found.distribution, found.source)

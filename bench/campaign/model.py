@@ -192,8 +192,7 @@ def correlations_of(sources: Sequence[Source]) -> Matrix:
 def identity(influence: str, record: Record) -> str:
     """An influence's identity beyond its run: the rule of `bench.calibration.adopted`. One that came with a calibration
     has its own run's name in front already."""
-    certified = {} if record.setup is None else record.setup.certified
-    if of_the_rig(influence, certified) or NAME.fullmatch(influence.partition("/")[0]):
+    if of_the_rig(influence) or NAME.fullmatch(influence.partition("/")[0]):
         return influence
     return f"{record.run_id}/{influence}"
 

@@ -14,7 +14,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bench.calibration import adopted
 from bench.errors import AnalysisError, ConfigError
 from bench.findings import SIMULATED_CONTROLLER, Finding
 from bench.history.compare import Comparison, Difference, Side, bent, compare
@@ -23,7 +22,6 @@ from bench.quantity import Quantity
 from bench.record.outcomes import Outcome
 from bench.record.records import Record, findings_of, measurement, unfinished
 from bench.record.setup import Certified, Setup
-from bench.rigfile.toleranced import Toleranced
 from bench.uncertainty import Estimate, Influence
 
 K = Quantity("K_i", "N/A", "force constant")
@@ -42,7 +40,7 @@ def value(middle: float, parts: Mapping[Influence, float]) -> Estimate:
 def record(run_id: str, estimate: Estimate, **other: Any) -> Record:
     """A finished run that measured K_i; every influence of a sensor, a mass or the site stands in its rig file."""
     certified = {i.id: Certified(1.0, i.u, i.unit, i.distribution, "SIM-1") for i in estimate.sensitivities
-                 if i.id.partition("/")[0] in ("sensors", "masses", "site", "capabilities", "encoders")}  # fmt: skip
+                 if i.id.partition("/")[0] in ("sensors", "masses", "site", "capabilities")}  # fmt: skip
     start = unfinished(
         run_id=run_id, procedure="amb-calibration", rig="stand", uut={"model": "stand", "serial": "001"}, started="2026-01-01",
         seed=None, plan={}, versions={}, setup=Setup("ab" * 32, "", {}, {"K_i": "K@inboard"}, certified),
@@ -57,16 +55,6 @@ def compared(a: Record, b: Record) -> Comparison:
 
 def difference(a: Record, b: Record) -> Difference:
     return compared(a, b).differences[0]
-
-
-def test_a_scale_that_came_with_a_calibration_is_the_scale_that_the_other_run_reads() -> None:
-    """The second run rests on an adopted value of the same encoder: one scale, which drops out of the difference."""
-    pitch = Toleranced(value=2e-6, unit="m", half_width=6e-11, distribution="rectangular", source="C")
-    scale = Influence("encoders/x/pitch", "pitch", pitch.standard_uncertainty / pitch.value, "1", "B", "rectangular")
-    fact = adopted({"K": Estimate(75.0, "N/A", {scale: 75.0})}, A, (), {scale.id: pitch})["K"]
-    found = difference(record(A, value(75.0, {scale: 75.0, scatter(0.02): 1.0})),
-                       record(B, fact + value(0.1, {scatter(0.02): 1.0})))  # fmt: skip
-    assert found.u == pytest.approx(math.hypot(0.02, 0.02))
 
 
 def test_what_both_share_drops_out_as_gtc_has_it() -> None:
