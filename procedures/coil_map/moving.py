@@ -31,10 +31,8 @@ from procedures.coil_map.steps import (
 )
 
 FAR = "far"  # event: the mover went too far, and the run ended there
-MORE, OVER = (
-    4,
-    1.5,
-)  # times what a capture has to spare that the next attempt has at least, and times what this one took too long
+MORE = 4  # times what a capture has to spare that the next attempt has at least
+OVER = 1.5  # times what an attempt took too long that the next one has
 
 
 @contextmanager
@@ -53,10 +51,10 @@ def let_go(rig: Rig, can: CoilMap) -> Iterator[None]:
 
 
 def _end(rig: Rig, can: CoilMap, before: Mapping[str, float]) -> None:
+    for system in can.systems.values():  # first: what flows waits for nothing
+        rig.levitation.write({system.d: 0.0, system.q: 0.0})
     if can.lasts:
         rig.levitation.write({can.lasts: 0.0})
-    for system in can.systems.values():
-        rig.levitation.write({system.d: 0.0, system.q: 0.0})
     transition(rig, RigState.OFF)
     rig.levitation.write(before)
 
