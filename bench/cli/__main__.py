@@ -13,7 +13,7 @@ from typing import Annotated
 import typer
 
 from bench.cli import options as o
-from bench.cli import stored
+from bench.cli import stored, threads
 from bench.cli.status import run_app
 
 app = typer.Typer(
@@ -286,6 +286,7 @@ def map_(
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns its exit status. Nothing that goes wrong leaves as a traceback."""
+    threads.limit()
     return run_app(app, sys.argv[1:] if arguments is None else list(arguments))
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from bench.link.codec import FLOATS, Array, Payloads, aligned_type, bits_of, bytes_of, laid_out
-from bench.link.windows import SIDE, Words
+from bench.link.windows import SIDE, Words, fits, places
 from bench.rigfile.messages import Message, Signal
 
 Codes = npt.NDArray[Any]
@@ -17,9 +18,14 @@ _LARGEST: Final = {16: 65504.0, 32: float(2**128 - 2**104), 64: sys.float_info.m
 
 
 class Encoder:
-    """Encodes payloads of one message. `names` are its signals in the order of the rows of a table, as a `Decoder` has them."""
+    """Encodes payloads of one message. `names` are its signals in the order of the rows of a table, as a `Decoder` has them.
 
-    def __init__(self, message: Message) -> None:
+    Args:
+        message: which.
+        counts: names of signals whose bits are given apart, as whole numbers; their values in a table are to be raw zero.
+    """
+
+    def __init__(self, message: Message, counts: Sequence[str] = ()) -> None:
         self.message = message
         signals, self._groups, self._places = laid_out(message)
         self.names = tuple(s.name for s in signals)
@@ -30,12 +36,15 @@ class Encoder:
         self._low, self._high = (np.array([x[k] for x in limits])[:, None] for k in (0, 1))
         self._whole = np.array([not s.is_float for s in signals])
         self._all_whole, self._all_float = bool(self._whole.all()), not self._whole.any()
+        apart = [(row, message.signal(name)) for row, name in enumerate(counts)]
+        self._counts = list(places([(row, s) for row, s in apart if fits(s, bytes_of)], bytes_of))
+        self._put = [(row, s) for row, s in apart if not fits(s, bytes_of)]
 
-    def table(self, values: Array) -> Payloads:
-        """Payloads (n, message.length) of values (signals, n) in the signals' units.
+    def table(self, values: Array, counts: Codes | None = None) -> Payloads:
+        """Payloads (n, message.length) of values (signals, n) in the signals' units, and of those given apart (counts, n).
 
         A value beyond what the bits can hold becomes the nearest that they can, as a converter at its end does; what is not
-        a number is that for a float, and raw zero for an integer.
+        a number is that for a float, and raw zero for an integer. Of whole numbers given apart the low bits are put in.
         """
         raw = values - self._offsets if self._shifted else values.copy()
         raw /= self._scales
@@ -52,6 +61,11 @@ class Encoder:
             p.write(wide, raw[p.rows].astype(np.int64))
         for row, group in self._groups:
             _write(out, group, raw[row : row + len(group)])
+        if counts is not None:
+            for p in self._counts:
+                p.write(wide, counts[p.rows])
+            for row, s in self._put:
+                put(out, s, counts[row])
         return out
 
 

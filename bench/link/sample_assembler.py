@@ -14,10 +14,12 @@ import numpy as np
 import numpy.typing as npt
 
 from bench import units
+from bench.link.beside import beside, name_in, width_of
 from bench.link.codec import Decoder
 from bench.link.frames import FrameBatch
 from bench.link.joining import Joiner, Sample
 from bench.rigfile import RigFile
+from bench.rigfile.binding import Binding
 from bench.rigfile.messages import Message
 
 Values = npt.NDArray[np.float64]
@@ -84,6 +86,56 @@ class _Frames:
     arrived: Integers
 
 
+class _Whole:
+    """All messages of a sample as one long one, to read those of many samples at once where they follow each other in order."""
+
+    def __init__(self, parts: list[_Part], binding: Binding) -> None:
+        messages = [p.message for p in parts]
+        self._lengths = np.array([m.length for m in messages])
+        identifiers = np.array([m.identifier for m in messages], np.uint32)
+        self._sorted = np.argsort(identifiers)
+        self._identifiers = identifiers[self._sorted]
+        self._width, self._decoder = width_of(messages), Decoder(beside(messages))
+        row = {name: k for k, name in enumerate(self._decoder.names)}
+        self._rows = [[row[name_in(p.message, p.decoder.names[k])] for k in p.rows] for p in parts]  # of the channels
+        counts = [binding.sequence, *[binding.counter] * (len(parts) - 1)]
+        self._counts = [row[name_in(m, name)] for m, name in zip(messages, counts, strict=True)]
+        self._tick = row[name_in(messages[0], binding.tick)]
+        self._parts = parts
+
+    def kinds(self, batch: FrameBatch) -> tuple[Integers, int]:
+        """Which message each frame is, -1 for none of them; and how many have an identifier of theirs but another length."""
+        at = np.minimum(np.searchsorted(self._identifiers, batch["id"]), len(self._identifiers) - 1)
+        mine, kinds = self._identifiers[at] == batch["id"], self._sorted[at]
+        right = mine & (batch["length"] == self._lengths[kinds])
+        return np.where(right, kinds, -1), int(np.count_nonzero(mine)) - int(np.count_nonzero(right))
+
+    def in_order(self, kinds: Integers) -> bool:
+        """Whether there are any, and they follow each other as they do in a sample, over and over."""
+        return len(kinds) > 0 and bool(((kinds[0] + np.arange(len(kinds))) % len(self._parts) == kinds).all())
+
+    def frames(self, chosen: FrameBatch, first: int) -> list[_Frames]:
+        """The frames of each part, of some in order that begin with that part."""
+        parts = len(self._parts)
+        samples = -(-(first + len(chosen)) // parts)
+        of_last = first + len(chosen) - (samples - 1) * parts  # parts that have a frame in the last sample
+        payloads = np.zeros((samples * parts, self._width), np.uint8)
+        payloads[first : first + len(chosen)] = chosen["data"][:, : self._width]
+        table = self._decoder.table(payloads.reshape(samples, -1))
+        out = []
+        for k, part in enumerate(self._parts):
+            mine = slice(int(k < first), samples - int(k >= of_last))
+            values = table[self._rows[k], mine]
+            if not part.plain:
+                values = values * part.factors + part.offsets
+            tick = table[self._tick, mine].astype(np.int64) if not k else np.empty(0, np.int64)
+            arrived = chosen["t_ns"][(k - first) % parts :: parts]
+            out.append(
+                _Frames(table[self._counts[k], mine].astype(np.int64), tick, np.ascontiguousarray(values.T), arrived)
+            )
+        return out
+
+
 class Assembler:
     """Takes the telemetry of one rig apart; `wrong_length` and `misplaced` count frames that were left out."""
 
@@ -96,6 +148,7 @@ class Assembler:
         self.sequence_bits = sync.signal(b.sequence).length
         self.tick_bits = sync.signal(b.tick).length
         self._joiner = Joiner(self.sequence_bits, [p.message.signal(b.counter).length for p in self._parts[1:]])
+        self._whole = _Whole(self._parts, b)
 
     @property
     def misplaced(self) -> int:
@@ -118,14 +171,14 @@ class Assembler:
         return Rows(sequence, tick, frames["t_ns"], dict(zip(part.channels, si, strict=True)), si)
 
     def _several(self, batch: FrameBatch) -> Rows:
-        kind = np.full(len(batch), -1)
-        frames = []
-        for k, part in enumerate(self._parts):
-            mine, wrong = part.decoder.chosen(batch)
-            self.wrong_length += wrong
-            kind[(batch["id"] == part.message.identifier) & (batch["length"] == part.message.length)] = k
-            frames.append(self._frames(part, mine))
-        kinds = kind[kind >= 0]
+        kind, wrong = self._whole.kinds(batch)
+        self.wrong_length += wrong
+        mine = kind >= 0
+        kinds, chosen = (kind, batch) if mine.all() else (kind[mine], batch[mine])
+        if self._whole.in_order(kinds):
+            frames = self._whole.frames(chosen, int(kinds[0]))
+        else:
+            frames = [self._frames(part, chosen[kinds == k]) for k, part in enumerate(self._parts)]
         place = [0] * len(frames)
         low = int(np.argmax(kinds == 0)) + 1 if (kinds == 0).any() else len(kinds)
         done = self._joined(kinds[:low], frames, place)

@@ -9,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from bench import units
+from bench.link.beside import beside, name_in, width_of
 from bench.link.frames import FD, FRAME, FrameBatch, empty_batch
-from bench.link.payloads import Encoder, put
+from bench.link.payloads import Encoder
 from bench.rigfile import RigFile
 from bench.rigfile.busload import frame_seconds
 from bench.rigfile.elements import Mark
@@ -28,11 +29,11 @@ CODES = ("state", "fault", FLAGS)  # whole numbers that stand for themselves
 
 
 @dataclass(frozen=True)
-class _Part:
-    """One telemetry message: its encoder; channels in its rows with the places of their readings, factors and offsets to the
-    signals' units, and how each comes round (0: it does not); codes by signal; when it has gone out after the first, ns."""
+class _Layout:
+    """All telemetry messages of a sample as one long one: its encoder; the channels' rows in its table with the places of their
+    readings, factors and offsets to the signals' units, and how each comes round (0: it does not); places of the codes, the
+    first of what is counted."""
 
-    message: Message
     encoder: Encoder
     rest: npt.NDArray[np.float64]  # what signals say that nothing is bound to: raw zero
     rows: list[int]
@@ -40,8 +41,7 @@ class _Part:
     factors: npt.NDArray[np.float64]
     offsets: npt.NDArray[np.float64]
     rounds: npt.NDArray[np.float64]
-    codes: dict[str, int]
-    after_ns: int
+    codes: list[int]
 
 
 class BoundTelemetry:
@@ -56,7 +56,7 @@ class BoundTelemetry:
     """
 
     def __init__(self, rig: RigFile, messages: MessageMap, truth: Truth, plant: SimulatedPlant) -> None:
-        machine, self._binding, self._mark = truth.machine, rig.binding, rig.mark or Mark()
+        machine, self._mark = truth.machine, rig.mark or Mark()
         self._known = tellable(rig, machine)
         names = tuple(dict.fromkeys((*machine.channels, *sorted(self._known), *CONTROLLER)))
         self._place = {name: k for k, name in enumerate(names)}
@@ -77,12 +77,13 @@ class BoundTelemetry:
         self._held_from: int | None = None
         self._tick_ns = round(plant.tick_s * 1e9)
         self._truth, self._sequence = truth, plant.tick // plant.period_ticks
-        self._parts = []
-        after_s = 0.0
-        for k, name in enumerate(rig.binding.telemetry):
-            bitrate = rig.link.bitrate
-            after_s += frame_seconds(messages[name], bitrate, rig.link.data_bitrate) if k and bitrate else 0.0
-            self._parts.append(self._part(rig, messages[name], round(after_s * 1e9)))
+        told = [messages[name] for name in rig.binding.telemetry]
+        self._layout, self._width = self._laid_out(rig, told), width_of(told)
+        self._head = np.zeros(len(told), FRAME)  # of a sample's frames, what is the same in each
+        self._head["id"], self._head["length"] = [m.identifier for m in told], [m.length for m in told]
+        self._head["flags"] = [FD if m.fd else 0 for m in told]
+        seconds = [frame_seconds(m, rig.link.bitrate, rig.link.data_bitrate) if rig.link.bitrate else 0.0 for m in told]
+        self._head["t_ns"] = np.rint(np.cumsum([0.0, *seconds[1:]]) * 1e9)
 
     def _told_elsewhere(self, rig: RigFile, machine: Machine) -> Iterator[tuple[int, int, int]]:
         """Of a machine that has a status word of its own, where the rig file has other bits for it: the word's bits, the place
@@ -95,27 +96,29 @@ class BoundTelemetry:
         if any(told[name] != (self._place[FLAGS], own[name].mask) for name in told if name in own):
             yield from ((own[name].mask or 0, *where) for name, where in told.items() if name in own)
 
-    def _part(self, rig: RigFile, message: Message, after_ns: int) -> _Part:
-        encoder = Encoder(message)
-        told: list[tuple[int, int, float, float, float]] = []
-        codes = {}
+    def _laid_out(self, rig: RigFile, messages: list[Message]) -> _Layout:
+        whole, b, owners = beside(messages), rig.binding, {m.name for m in messages}
+        told: list[tuple[str, int, float, float, float]] = []
+        codes: dict[str, int] = {}
         for name, channel in rig.channels.items():
-            owner, _, signal = channel.signal.partition(".")
             reading = told_as(rig, name, self._known)
-            if owner != message.name or reading is None:
+            if channel.signal.partition(".")[0] not in owners or reading is None:
                 continue
-            s, unit = message.signal(signal), units.UNITS[message.signal(signal).unit]
             if name in self._codes:
-                codes[signal] = self._place[reading]
+                codes[channel.signal] = self._place[reading]
                 continue
+            s = whole.signal(channel.signal)
+            unit = units.UNITS[s.unit]
             around = float(2**s.length) * abs(s.scale) if name in (self._mark.pulses, self._mark.edge) else 0.0
             if name == self._mark.angle and not s.signed and s.offset >= 0:
                 around = 2 * np.pi / unit.factor
-            told.append((encoder.names.index(signal), self._place[reading], unit.factor, unit.offset, around))
-        rest = np.array([s.offset for s in (message.signal(n) for n in encoder.names)])[:, None]
-        rows, columns = [x[0] for x in told], [x[1] for x in told]
+            told.append((channel.signal, self._place[reading], unit.factor, unit.offset, around))
+        counted = [name_in(messages[0], b.tick), name_in(messages[0], b.sequence)]
+        encoder = Encoder(whole, [*codes, *counted, *(name_in(m, b.counter) for m in messages[1:])])
+        rest = np.array([whole.signal(n).offset for n in encoder.names])[:, None]
+        rows, columns = [encoder.names.index(x[0]) for x in told], [x[1] for x in told]
         factors, offsets, rounds = np.array([x[2:] for x in told]).reshape(len(told), 3).T[:, :, None]
-        return _Part(message, encoder, rest, rows, columns, factors, offsets, rounds, codes, after_ns)
+        return _Layout(encoder, rest, rows, columns, factors, offsets, rounds, list(codes.values()))
 
     def encode(self, spans: list[Span], clock: tuple[int, int]) -> FrameBatch:
         """Frames for what ran, in order of their times, some of them a little after it: as `TelemetryEncoder.encode`."""
@@ -134,12 +137,10 @@ class BoundTelemetry:
             self._plant(values, ticks, np.repeat([s.state in HELD for s in spans], [len(s.rows) for s in spans]))
         sequence = np.arange(self._sequence, self._sequence + n)
         self._sequence += n
-        batch = np.zeros((n, len(self._parts)), FRAME)
-        for k, part in enumerate(self._parts):
-            batch["t_ns"][:, k] = clock[0] + (ticks - clock[1]) * self._tick_ns + part.after_ns
-            batch["id"][:, k], batch["flags"][:, k] = part.message.identifier, FD if part.message.fd else 0
-            batch["length"][:, k] = part.message.length
-            batch["data"][:, k, : part.message.length] = self._payloads(part, values, sequence, ticks)
+        batch = np.tile(self._head, (n, 1))
+        batch["t_ns"] += (clock[0] + (ticks - clock[1]) * self._tick_ns)[:, None]
+        payloads = self._payloads(values, sequence, ticks)
+        batch["data"][:, :, : self._width] = payloads.reshape(n, len(self._head), self._width)
         return kept(batch, sequence, self._truth).reshape(-1)
 
     def _plant(self, values: npt.NDArray[np.float64], ticks: Ints, held: npt.NDArray[np.bool_]) -> None:
@@ -151,21 +152,14 @@ class BoundTelemetry:
             for place, value in self._planted.items():
                 values[told, place] = value
 
-    def _payloads(
-        self, part: _Part, values: npt.NDArray[np.float64], sequence: Ints, ticks: Ints
-    ) -> npt.NDArray[np.uint8]:
-        table = np.repeat(part.rest, len(values), axis=1)
-        told = (values[:, part.columns].T - part.offsets) / part.factors
-        around = part.rounds[:, 0] > 0
-        told[around] %= part.rounds[around]
-        table[part.rows] = told
-        payloads = part.encoder.table(table)
-        b, message = self._binding, part.message
-        for signal, column in part.codes.items():
-            put(payloads, message.signal(signal), values[:, column].astype(np.int64))
-        if part is self._parts[0]:
-            put(payloads, message.signal(b.sequence), sequence)
-            put(payloads, message.signal(b.tick), ticks)
-        else:
-            put(payloads, message.signal(b.counter), sequence)
-        return payloads
+    def _payloads(self, values: npt.NDArray[np.float64], sequence: Ints, ticks: Ints) -> npt.NDArray[np.uint8]:
+        of = self._layout
+        table = np.repeat(of.rest, len(values), axis=1)
+        told = (values[:, of.columns].T - of.offsets) / of.factors
+        around = of.rounds[:, 0] > 0
+        told[around] %= of.rounds[around]
+        table[of.rows] = told
+        counts = np.empty((len(of.codes) + 1 + len(self._head), len(values)), np.int64)
+        counts[: len(of.codes)] = values[:, of.codes].T
+        counts[len(of.codes)], counts[len(of.codes) + 1 :] = ticks, sequence
+        return of.encoder.table(table, counts)

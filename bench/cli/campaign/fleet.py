@@ -16,7 +16,8 @@ from typing import Any
 
 from bench import catalogue, os_signals
 from bench.campaign.directory import CampaignDirectory
-from bench.cli.campaign.job import THREAD_LIMITS, run_rig, settle_in
+from bench.cli import threads
+from bench.cli.campaign.job import run_rig, settle_in
 from bench.cli.campaign.tasks import RigTask
 from bench.errors import BenchError
 from bench.progress import Progress
@@ -39,8 +40,8 @@ class Stopped:
 @contextmanager
 def pool(jobs: int) -> Iterator[tuple[Executor, int]]:
     """Processes of their own interpreter each, with library threads limited to one: one process per core."""
-    before = {name: os.environ.get(name) for name in THREAD_LIMITS}
-    os.environ.update(dict.fromkeys(THREAD_LIMITS, "1"))
+    before = {name: os.environ.get(name) for name in threads.LIMITS}
+    os.environ.update(dict.fromkeys(threads.LIMITS, "1"))
     spawned = multiprocessing.get_context("spawn")
     executor = ProcessPoolExecutor(jobs, spawned, settle_in, (catalogue.PROCEDURES,))
     try:

@@ -20,8 +20,6 @@ from typing import Any
 
 from bench.cli.campaign.tasks import RigTask, StepTask
 
-THREAD_LIMITS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-
 
 @dataclass
 class _Line:
