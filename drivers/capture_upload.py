@@ -22,7 +22,8 @@ LONGEST, SHORTEST = 131_072, 256
 ATTEMPTS = 12  # in a row that brought nothing
 TIMES = 2  # that a whole buffer is fetched
 SILENT_S = 0.3
-LOOK_S, LONG_S = 0.002, 0.05
+LOOK_S, LONG_S, SLOW_S = 0.002, 0.05, 0.1
+PORTION = 4096  # bytes: a look waits for so many where the link is slow, up to SLOW_S
 ENDS = ("wrong-sequence", "wrong-length", "too-long")
 Progress = Callable[[int, int], None]
 
@@ -199,9 +200,11 @@ class Silence:
 
     def pause(self, left: int) -> float:
         """Half the time that what is left should take at the rate so far; at first a part of what was waited already."""
-        took = (self._moved - self._begin) * 1e-9
-        waited = (self._clock.now_ns() - self._moved) * 1e-9
-        return min(max(0.5 * left * took / self._held if self._held else 0.2 * waited, LOOK_S), LONG_S)
+        if not self._held:
+            return min(max(0.2 * (self._clock.now_ns() - self._moved) * 1e-9, LOOK_S), LONG_S)
+        byte_s = (self._moved - self._begin) * 1e-9 / self._held
+        longest = max(LONG_S, min(PORTION * byte_s, SLOW_S)) if self._held >= PORTION else LONG_S
+        return min(max(0.5 * left * byte_s, LOOK_S), longest)
 
     def over(self, held: int) -> bool:
         """Whether nothing has come for too long; `held` is what has come in all."""
