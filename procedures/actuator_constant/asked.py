@@ -13,9 +13,8 @@ from procedures.actuator_constant.sines import loops, places, rate, sine, with_t
 from procedures.actuator_constant.steps import STATE
 from procedures.position_loops.injection import BELOW, REFERENCE, ability, parameters_of
 from procedures.position_loops.motors import motors, periods_of
+from procedures.shared import planned
 from procedures.shared.rates import of_rate
-
-OBSERVER = "observer"
 
 
 def adds(rig: RigFile, plan: Plan, loop: str) -> bool:
@@ -33,11 +32,9 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     if not loops(rig, plan):
         yield f"loops: found {plan.loops!r}; motors are known along {', '.join(known)}"
         return
-    observers = rig.capabilities.settings.get(OBSERVER, {})
-    if observers and plan.observer not in observers:
-        yield f"observer: found {plan.observer!r}; expected one of {', '.join(observers)}"
-    if unknown := [name for name in plan.parameters if name not in rig.parameters]:
-        yield f"parameters: found {', '.join(unknown)}; expected parameters of this rig"
+    yield from planned.of_observer(rig, plan.observer)
+    if problems := list(planned.of_parameters(rig, plan.parameters)):
+        yield from problems
         return
     if plan.high_hz > BELOW * rate(rig, plan) or plan.high_hz < 2 * plan.low_hz:
         yield f"high_hz: found {plan.high_hz:g}; expected {2 * plan.low_hz:g} to {BELOW * rate(rig, plan):g}"

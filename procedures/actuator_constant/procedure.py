@@ -24,7 +24,7 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from procedures.actuator_constant import checks, estimates, ring
 from procedures.actuator_constant import figures as drawn
-from procedures.actuator_constant.asked import OBSERVER, adds, check, requires
+from procedures.actuator_constant.asked import adds, check, requires
 from procedures.actuator_constant.estimates import Result
 from procedures.actuator_constant.plan import Plan
 from procedures.actuator_constant.sines import (
@@ -41,7 +41,7 @@ from procedures.actuator_constant.sines import (
 from procedures.actuator_constant.steps import ADDED, SINE, channels, read_added, read_taken
 from procedures.position_loops.injection import REFERENCE, ability, injected
 from procedures.position_loops.motors import around, motors
-from procedures.shared import assumptions
+from procedures.shared import assumptions, planned
 
 K_FORCE = Quantity("K_force", "N/A", "force of a motor along per ampere that gives it", title="force constant")
 K_TORQUE = Quantity("K_torque", "N m/A", "torque of a motor per ampere that gives it", title="torque constant")
@@ -83,7 +83,7 @@ def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
     """The observer; nothing is injected, nothing is added."""
     can = ability(rig)
     added = {one.added: 0.0 for one in rig.capabilities.force_currents.values() if one.added}
-    return {can.axis: can.off, **added, **rig.capabilities.settings.get(OBSERVER, {}).get(plan.observer, {})}
+    return {can.axis: can.off, **added, **planned.observer(rig, plan.observer)}
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:

@@ -26,7 +26,7 @@ from procedures.bearing_constant.estimates import Result
 from procedures.bearing_constant.plan import Plan
 from procedures.bearing_constant.stand import captured, hooks, masses, planes, rate, set_points, settle_s, visits
 from procedures.bearing_constant.steps import STATE, VISIT, read_visits
-from procedures.shared import assumptions
+from procedures.shared import assumptions, planned
 from procedures.shared.rates import of_rate
 
 K_B = Quantity(estimates.K_B, "N/A", "force of a radial actuator per ampere along it", title="bearing constant")
@@ -34,13 +34,12 @@ K_MEAN = Quantity(estimates.K_MEAN, "N/A", "weight at a hook over the currents o
                   title="constant of both planes together")  # fmt: skip
 MEASURES = (K_B, K_MEAN)
 MARGIN_S = 1e-3  # of a capture
-OBSERVER = "observer"
 ONCE = 6  # visits of a round
 
 
 def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
     """The observer."""
-    return dict(rig.capabilities.settings.get(OBSERVER, {}).get(plan.observer, {}))
+    return planned.observer(rig, plan.observer)
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
@@ -102,9 +101,7 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
         yield "hooks: found one; expected two, or a plan that names it: K_B of each plane is not told by one place"
     if len(masses(rig, plan)) == 1:
         yield f"masses: found {masses(rig, plan)[0]} alone; expected two, each the other's check"
-    observers = rig.capabilities.settings.get(OBSERVER, {})
-    if observers and plan.observer not in observers:
-        yield f"observer: found {plan.observer!r}; expected one of {', '.join(observers)}"
+    yield from planned.of_observer(rig, plan.observer)
     yield from of_rate(rig, plan.rate_hz)
     yield from Envelope(rig).problems_of(dict(set_points(rig, plan)))
 

@@ -31,7 +31,7 @@ from procedures.cogging_map.steps import STATE, SWEEP, read_passes
 from procedures.cogging_map.sweeps import Way, fed, loops, way
 from procedures.position_loops.injection import ability
 from procedures.position_loops.motors import around, motors, periods_of
-from procedures.shared import assumptions
+from procedures.shared import assumptions, planned
 from procedures.synchronous.dwells import telemetry_period_s
 
 CURRENT = Quantity("cogging_current", "A", "amplitude of the first harmonic of the current that takes cogging off")
@@ -50,7 +50,6 @@ PEAK_TORQUE = Quantity("peak_torque", "N m", "greatest torque of cogging, by its
 FRICTION_TORQUE = Quantity("friction_torque", "N m", "half of what the torque up has over that down")
 FORCES, TORQUES = (FORCE, PEAK_FORCE, FRICTION_FORCE), (TORQUE, PEAK_TORQUE, FRICTION_TORQUE)
 MEASURES = (CURRENT, PEAK_CURRENT, FRICTION_CURRENT, PHASE, SHARE, *FORCES, *TORQUES)
-OBSERVER = "observer"
 CONSTANTS, ZEROS = "actuator-constant", "encoder-zero"
 DEFAULTS = Plan.model_validate({})
 
@@ -75,7 +74,7 @@ def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
     """The observer; nothing injected, nothing added."""
     can = ability(rig)
     added = {one.added: 0.0 for one in rig.capabilities.force_currents.values() if one.added}
-    return {can.axis: can.off, **added, **rig.capabilities.settings.get(OBSERVER, {}).get(plan.observer, {})}
+    return {can.axis: can.off, **added, **planned.observer(rig, plan.observer)}
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
@@ -151,11 +150,9 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     if not wanted:
         yield f"loops: found {plan.loops!r}; this rig has none of them whose motors' cogging is told"
         return
-    observers = rig.capabilities.settings.get(OBSERVER, {})
-    if observers and plan.observer not in observers:
-        yield f"observer: found {plan.observer!r}; expected one of {', '.join(observers)}"
-    if unknown := [name for name in plan.parameters if name not in rig.parameters]:
-        yield f"parameters: found {', '.join(unknown)}; expected parameters of this rig"
+    yield from planned.of_observer(rig, plan.observer)
+    if problems := list(planned.of_parameters(rig, plan.parameters)):
+        yield from problems
         return
     envelope, period_s = Envelope(rig), telemetry_period_s(rig)
     for loop in wanted:

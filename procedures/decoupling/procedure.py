@@ -28,6 +28,7 @@ from procedures.decoupling import figures as drawn
 from procedures.decoupling.estimates import Result, coupling_of, excursion_of, named, ratio_of
 from procedures.decoupling.plan import Plan
 from procedures.decoupling.steps import ALONE, FAST, NUDGED, SLOW, SPARE_S, STATE, read_runs
+from procedures.shared import planned
 from procedures.stages import assumptions, map_model
 from procedures.stages.pairs import lacks, pairs, played, silenced, sine, waits_at
 
@@ -186,8 +187,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     if plan.integrators not in known and (known or plan.integrators not in ("", "on")):
         expected = ", ".join(known) or "on (the rig file has no choice)"
         yield f"integrators: found {plan.integrators!r}; expected one of {expected}"
-    if unknown := [name for name in plan.parameters if name not in rig.parameters]:
-        yield f"parameters: found {', '.join(unknown)}; expected parameters of this rig"
+    if problems := list(planned.of_parameters(rig, plan.parameters)):
+        yield from problems
         return
     if plan.model != OWN:
         try:

@@ -27,7 +27,7 @@ from procedures.emf_constant.moves import Line, captured, lines, rate, seconds, 
 from procedures.emf_constant.plan import Plan
 from procedures.emf_constant.steps import MOVE, STATE, read_taken
 from procedures.position_loops.motors import periods_of
-from procedures.shared import assumptions
+from procedures.shared import assumptions, planned
 from procedures.shared.rates import of_rate
 
 FLUX = Quantity("flux", "Wb", "flux that a motor's moving field links with one of its coils, at most")
@@ -57,7 +57,7 @@ def needs(plan: Plan) -> tuple[Need, ...]:
 
 def settings(rig: RigFile, plan: Plan) -> Mapping[str, float]:
     """The observer."""
-    return rig.capabilities.settings.get("observer", {}).get(plan.observer, {})
+    return planned.observer(rig, plan.observer)
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
@@ -114,9 +114,7 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     if unknown := [m for m in plan.motors if m not in known]:
         yield f"motors: found {', '.join(unknown)}; coils and voltages are known of {', '.join(known)}"
         return
-    observers = rig.capabilities.settings.get("observer", {})
-    if observers and plan.observer not in observers:
-        yield f"observer: found {plan.observer!r}; expected one of {', '.join(observers)}"
+    yield from planned.of_observer(rig, plan.observer)
     yield from of_rate(rig, plan.rate_hz)
     for line in lines(rig, plan):
         if abs(line.ends[1] - line.ends[0]) * abs(known[line.motor].per) < 1:

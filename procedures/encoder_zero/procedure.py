@@ -30,7 +30,7 @@ from procedures.encoder_zero.groups import ALONG, PLACES, TRIAL_REPEATS, Group, 
 from procedures.encoder_zero.plan import Plan
 from procedures.encoder_zero.steps import STATE, STEP, Taken, read_taken
 from procedures.position_loops.motors import periods_of
-from procedures.shared import assumptions
+from procedures.shared import assumptions, planned
 from procedures.shared.rates import of_rate
 
 ZERO = Quantity("zero", "rad", "electrical angle of the encoder at which the motor's field lies along its first phase")
@@ -48,7 +48,7 @@ def step_count(plan: Plan) -> int:
 
 def settings(rig: RigFile, plan: Plan) -> Mapping[str, float]:
     """The plan's observer; zeros as the rig file has them, no current stepped."""
-    out = dict(rig.capabilities.settings.get("observer", {}).get(plan.observer, {}))
+    out = planned.observer(rig, plan.observer)
     for one in groups.zeros(rig).values():
         out[one.zero] = rig.parameters[one.zero].default
     return out
@@ -148,9 +148,7 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     for motor in (m for m in plan.motors if m not in known):
         yield f"motors: found {motor}; the controller keeps the zeros of {', '.join(known)}"
         return
-    observers = rig.capabilities.settings.get("observer", {})
-    if observers and plan.observer not in observers:
-        yield f"observer: found {plan.observer!r}; expected one of {', '.join(observers)}"
+    yield from planned.of_observer(rig, plan.observer)
     yield from of_rate(rig, plan.rate_hz)
     for group in groups.groups(rig, plan):
         try:

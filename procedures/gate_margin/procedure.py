@@ -38,7 +38,7 @@ from procedures.gate_margin.place import (
 )
 from procedures.gate_margin.plan import Plan
 from procedures.gate_margin.steps import STATE, read_taken, read_trials
-from procedures.shared import assumptions
+from procedures.shared import assumptions, planned
 
 MARGIN = Quantity("gate_margin", "m", "gate less the largest radial reading in one of its times, noise included, "
                                       "mean over such times",
@@ -62,7 +62,7 @@ def needs(plan: Plan) -> tuple[Need, ...]:
 
 def settings(rig: RigFile, plan: Plan) -> Mapping[str, float]:
     """The observer."""
-    return rig.capabilities.settings.get("observer", {}).get(plan.observer, {})
+    return planned.observer(rig, plan.observer)
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:

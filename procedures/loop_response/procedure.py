@@ -39,7 +39,7 @@ from procedures.loop_response.injection import (
 )
 from procedures.loop_response.plan import Plan
 from procedures.loop_response.steps import REFINED, STATE, STEP, SURVEY, line_of, read_taken
-from procedures.shared import assumptions
+from procedures.shared import assumptions, planned
 from procedures.shared.rates import of_rate
 
 BANDWIDTH = Quantity(
@@ -171,8 +171,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     if plan.sensitive and (not can.wave or SENSOR not in can.places):
         yield "sensitive: the controller adds nothing to a reading, or no capture shows what it adds; expected none"
         return
-    if unknown := [name for name in plan.parameters if name not in rig.parameters]:
-        yield f"parameters: found {', '.join(unknown)}; expected parameters of this rig"
+    if problems := list(planned.of_parameters(rig, plan.parameters)):
+        yield from problems
         return
     if plan.high_hz > BELOW * rate(rig, plan):
         most = f"{BELOW * rate(rig, plan):g} or less: {BELOW:g} of the rate of captures"

@@ -27,7 +27,7 @@ from procedures.mission import figures as drawn
 from procedures.mission.estimates import Told
 from procedures.mission.plan import Plan
 from procedures.mission.steps import LIFT, MOVE, TURN, Flight, captured, motion, radial, read
-from procedures.shared import assumptions
+from procedures.shared import assumptions, planned
 
 PEAK = Quantity("peak_reading", "m", "largest distance from the probe's zero during the moves, without noise")
 SWING = Quantity("swing", "m", "peak to peak during a repeat, there and back, without noise")
@@ -44,7 +44,7 @@ LOOK_S = 0.01
 
 def settings(rig: RigFile, plan: Plan) -> Mapping[str, float]:
     """The observer that the plan asks for."""
-    return rig.capabilities.settings.get("observer", {}).get(plan.observer, {})
+    return planned.observer(rig, plan.observer)
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:

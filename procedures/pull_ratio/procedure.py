@@ -43,7 +43,7 @@ from procedures.pull_ratio.planes import (
     settle_s,
 )
 from procedures.pull_ratio.steps import STATE, STEP, Taken, read_taken
-from procedures.shared import assumptions
+from procedures.shared import assumptions, planned
 from procedures.shared.rates import of_rate
 
 PULL_RATIO = Quantity(estimates.RATIO, "A/m", "negative stiffness over force constant, of a plane along an axis: K_pull/K_B",
@@ -66,7 +66,6 @@ BY_POLE = (CONSTANT, CENTRE)
 MARGIN_S = 1e-3  # of a capture
 MARGIN = 0.8  # of a loop's limit: the magnets' centre is told by no rig file
 POLE, CONSTANTS = "unstable-pole", "bearing-constant"
-OBSERVER = "observer"
 
 
 def step_count(plan: Plan) -> int:
@@ -82,7 +81,7 @@ def needs(plan: Plan) -> tuple[Need, ...]:
 
 def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
     """The observer."""
-    return dict(rig.capabilities.settings.get(OBSERVER, {}).get(plan.observer, {}))
+    return planned.observer(rig, plan.observer)
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
@@ -160,9 +159,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     if list(levels) != sorted(set(levels)) or levels[0] >= 0 or levels[-1] <= 0:
         yield f"levels_m: found {levels}; expected different levels in ascending order, on both sides of zero"
         return
-    known = rig.capabilities.settings.get(OBSERVER, {})
-    if plan.observer and known and plan.observer not in known:
-        yield f"observer: found {plan.observer!r}; expected one of {', '.join(known)}"
+    if plan.observer:
+        yield from planned.of_observer(rig, plan.observer)
     if plan.pole == "calibration" and rig.capabilities.hold is None:
         yield "pole: found 'calibration'; expected none: the rig file tells no capabilities.hold"
     motion, at = rig.capabilities.motion, place(rig, plan)

@@ -27,13 +27,12 @@ from procedures.runout_map.estimates import Results
 from procedures.runout_map.plan import Plan
 from procedures.runout_map.planes import planes
 from procedures.runout_map.steps import STATE, TURN, read_turns
-from procedures.shared import assumptions
+from procedures.shared import assumptions, planned
 
 RUNOUT = Quantity("runout", "m", "runout of the probes' target less that of the magnets, of one plane and part")
 CURRENT = Quantity("runout_current", "A", "bearing current that turns with the shaft, of one plane and part",
                    title="current at one a turn")  # fmt: skip
 MEASURES = (RUNOUT, CURRENT)
-OBSERVER = "observer"
 
 
 def step_count(plan: Plan) -> int:
@@ -43,7 +42,7 @@ def step_count(plan: Plan) -> int:
 
 def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
     """The observer."""
-    return dict(rig.capabilities.settings.get(OBSERVER, {}).get(plan.observer, {}))
+    return planned.observer(rig, plan.observer)
 
 
 def ends(plan: Plan) -> tuple[float, float]:
@@ -116,12 +115,11 @@ def measured(results: Results) -> Iterator[Measured]:
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
-    observers, motion = rig.capabilities.settings.get(OBSERVER, {}), rig.capabilities.motion
+    motion = rig.capabilities.motion
     assert motion is not None
-    if observers and plan.observer not in observers:
-        yield f"observer: found {plan.observer!r}; expected one of {', '.join(observers)}"
-    if unknown := [name for name in plan.parameters if name not in rig.parameters]:
-        yield f"parameters: found {', '.join(unknown)}; expected parameters of this rig"
+    yield from planned.of_observer(rig, plan.observer)
+    if problems := list(planned.of_parameters(rig, plan.parameters)):
+        yield from problems
         return
     if len(set(plan.places_m)) < len(plan.places_m):
         yield "places_m: found a place twice"

@@ -26,13 +26,12 @@ from procedures.sensor_delay.estimates import Result
 from procedures.sensor_delay.plan import Plan
 from procedures.sensor_delay.sines import captured, probes, rate, sines
 from procedures.sensor_delay.steps import SINE, STATE, read_taken
-from procedures.shared import assumptions
+from procedures.shared import assumptions, planned
 from procedures.shared.rates import of_rate
 
 DELAY = Quantity("delay", "s", "time by which a probe's reading is behind the currents that are read with it",
                  title="delay of the position sensor")  # fmt: skip
 MARGIN_S = 1e-3  # of a capture
-OBSERVER = "observer"
 USUAL = 4  # probes, for the progress display
 
 
@@ -49,7 +48,7 @@ def steps_on(rig: RigFile, plan: Plan) -> int:
 def settings(rig: RigFile, plan: Plan) -> Mapping[str, float]:
     """The observer; nothing is injected."""
     can = ability(rig)
-    return {can.axis: can.off, **rig.capabilities.settings.get(OBSERVER, {}).get(plan.observer, {})}
+    return {can.axis: can.off, **planned.observer(rig, plan.observer)}
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
@@ -92,9 +91,7 @@ def measured(results: Sequence[Result]) -> Iterator[Measured]:
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
-    observers = rig.capabilities.settings.get(OBSERVER, {})
-    if observers and plan.observer not in observers:
-        yield f"observer: found {plan.observer!r}; expected one of {', '.join(observers)}"
+    yield from planned.of_observer(rig, plan.observer)
     yield from of_rate(rig, plan.rate_hz)
     if plan.high_hz > BELOW * rate(rig, plan) or plan.high_hz < 2 * plan.low_hz:
         yield f"high_hz: found {plan.high_hz:g}; expected {2 * plan.low_hz:g} to {BELOW * rate(rig, plan):g}"

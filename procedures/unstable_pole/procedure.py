@@ -21,7 +21,7 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.capture import rises
 from bench.rigfile.envelope import Envelope
-from procedures.shared import assumptions
+from procedures.shared import assumptions, planned
 from procedures.unstable_pole import checks, estimates
 from procedures.unstable_pole import figures as drawn
 from procedures.unstable_pole.estimates import Result
@@ -50,8 +50,7 @@ def steps_on(rig: RigFile, plan: Plan) -> int:
 
 def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
     """The observer, and where a hold ends."""
-    observers = rig.capabilities.settings.get("observer", {})
-    return {**observers.get(plan.observer, {}), ability(rig).bound: plan.bound_m}
+    return {**planned.observer(rig, plan.observer), ability(rig).bound: plan.bound_m}
 
 
 def order(rig: RigFile, plan: Plan) -> Iterator[tuple[str, float]]:
