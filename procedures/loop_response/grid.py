@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from itertools import pairwise
 
@@ -13,6 +14,7 @@ from procedures.loop_response.plan import Plan
 FALLEN = 0.5  # of |y/r|: a survey goes on until it is below
 HALVINGS = 3  # of what encloses the -3 dB point
 ACROSS, LEAST = 0.1, 0.03  # of the logarithm of |y/r|, and of the frequency
+WIDE = math.log(2.0)  # of the logarithm of the frequency: a gap that may hide a maximum of |S|
 BESIDE = 2  # halvings of what is beside the greatest sensitivity
 DOWN = 0.08  # of the logarithm of |S|, by which it is less at the outer lines about its maximum
 PEAK_WITHIN = (0.08, 0.4)  # of the logarithm of the frequency: how far about a maximum lines lie
@@ -44,6 +46,23 @@ def fall(seen: Mapping[float, float], most: float) -> tuple[float, float] | None
             at = one * (seen[one] / HALF) ** (1 / steep)
             return float(at), float(np.clip(ACROSS / steep, LEAST, most))
     return None
+
+
+def gaps(seen: Mapping[float, float]) -> list[float]:
+    """The middles of gaps wider than an octave where |S| is above one on either side: its greatest may be in one of them."""
+    return [
+        float(np.sqrt(one * other))
+        for one, other in pairwise(sorted(seen))
+        if math.log(other / one) > WIDE and max(seen[one], seen[other]) > 1
+    ]
+
+
+def most_in_gaps(plan: Plan) -> int:
+    """How many lines `gaps` may ask for, time and again, until none is wide."""
+    width, count = math.log(plan.high_hz / plan.low_hz) / (plan.lines - 1), 1
+    while width / count > WIDE:
+        count *= 2
+    return (plan.lines - 1) * (count - 1)
 
 
 def beside(seen: Mapping[float, float]) -> list[float]:

@@ -56,13 +56,15 @@ MARGIN_S = 1e-3  # of a capture
 
 def step_count(plan: Plan) -> int:
     """How many steps `acquire` records of six loops at most, for the progress display."""
-    return (len(plan.axes) or 6) * 2 * (plan.lines + 2 * grid.BESIDE + plan.refined)
+    return (len(plan.axes) or 6) * (2 * (plan.lines + 2 * grid.BESIDE + plan.refined) + grid.most_in_gaps(plan))
 
 
 def steps_on(rig: RigFile, plan: Plan) -> int:
     """How many it records on a rig, at most."""
-    looks = len(chosen(rig, plan)) + len(sensitive(rig, plan))
-    return looks * (plan.lines + 2 * grid.BESIDE + plan.refined)
+    some = len(sensitive(rig, plan))
+    return (len(chosen(rig, plan)) + some) * (plan.lines + 2 * grid.BESIDE + plan.refined) + some * grid.most_in_gaps(
+        plan
+    )
 
 
 def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
@@ -132,9 +134,14 @@ def _reference(look: _Look) -> None:
 
 
 def _sensor(look: _Look) -> None:
-    """The whole range, then beside the greatest, then finely about it."""
+    """The whole range, closer where the greatest may be, then beside it, then finely about it."""
     for hz in grid.survey(look.plan):
         look.take(hz, SURVEY)
+    asked: set[float] = set()  # a line that cannot be read leaves its gap as wide as it was
+    while middles := set(grid.gaps(look.seen)) - asked:
+        for hz in sorted(middles):
+            look.take(hz, SURVEY)
+        asked |= middles
     for _ in range(grid.BESIDE if look.seen else 0):
         for hz in grid.beside(look.seen):
             look.take(hz, SURVEY)

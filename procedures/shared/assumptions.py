@@ -42,6 +42,8 @@ LOOP_RESPONSE = (
     "The loop of another place: along the shaft the planes' levers change, and with them what one plane's loop moves. Of a "
     "mover of 1.34 kg between planes 45 mm off its middle, 1 mm changes the bandwidth of a radial loop by 3 to 4 %.",
     "The loop of another day: actuators whose constant is 1 % greater change a bandwidth by about 1 %.",
+    "A resonance narrower than an octave, which is how far apart lines may be: one that is damped by 0.1 and raises |S| to 3 "
+    "raises it to 1.3 at a line 40 % beside it, and S_max is read elsewhere.",
 )
 SPINDOWN = (
     "A constant torque that acts against either direction alike, such as a seal or a brake that drags whatever turns the "

@@ -123,3 +123,29 @@ def test_which_line_is_looked_at_next() -> None:
     at, reach = grid.top({8.0: math.exp(-0.2), 10.0: 1.0, 12.5: math.exp(-0.2)})
     assert at == pytest.approx(10)
     assert reach == pytest.approx(math.log(1.25) * math.sqrt(grid.DOWN / 0.2))
+
+
+def two_humps(hz: float) -> float:
+    """|S| with maxima of 2.5 at 160 Hz and of 2.67 at 987 Hz, of the width of a loop damped by a third, one far above them."""
+    rises = [(1.5, 160.0, 0.45), (1.67, 987.0, 0.35)]
+    return abs(1 / (1 + (40 / hz) ** 2)) * (1 + sum(a * math.exp(-((math.log(hz / f) / w) ** 2)) for a, f, w in rises))
+
+
+@pytest.mark.parametrize("lines", [4, 6, 8, 12])
+def test_the_greatest_of_two_maxima_is_found_however_few_lines_there_are(lines: int) -> None:
+    plan = Plan.model_validate({"lines": lines})
+    seen = {hz: two_humps(hz) for hz in grid.survey(plan)}
+    asked = 0
+    while middles := grid.gaps(seen):
+        seen |= {hz: two_humps(hz) for hz in middles}
+        asked += len(middles)
+    assert asked <= grid.most_in_gaps(plan)
+    for _ in range(grid.BESIDE):
+        seen |= {hz: two_humps(hz) for hz in grid.beside(seen)}
+    at, _ = grid.top(seen)
+    assert two_humps(at) == pytest.approx(max(two_humps(hz) for hz in np.geomspace(5, 1500, 4000)), rel=0.02)
+
+
+def test_no_line_is_asked_for_where_sensitivity_is_below_one_or_lines_are_close() -> None:
+    assert grid.gaps({5.0: 0.1, 50.0: 0.9, 90.0: 1.4, 150.0: 2.0}) == []
+    assert grid.gaps({5.0: 0.1, 50.0: 1.2, 200.0: 0.9}) == pytest.approx([math.sqrt(250), 100.0])
