@@ -68,6 +68,15 @@ CASES: Mapping[str, Case] = {
             "gamma_zero": (1e-4, 3e-4, 1e-3),  # rad
         },
     ),
+    "static-characteristics": Case(
+        "rlsrm", 200, {"angles_per_position": 2, "levels_A": [2.0, 5.0]},
+        {
+            "load_cells.x.gain": (0.001, 0.003, 0.01),  # relative
+            "load_cells.angle.gain": (0.003, 0.01, 0.03),  # relative
+            "i_a1.gain": (0.003, 0.01, 0.03),  # relative
+            "stator_zero_1": (1e-3, 3e-3, 1e-2),  # rad
+        },
+    ),
 }  # fmt: skip
 
 

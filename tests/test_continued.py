@@ -170,6 +170,20 @@ def test_a_continued_run_can_be_continued(first: RunResult, tmp_path: Path) -> N
     assert last.outcome is Outcome.PASS
 
 
+def test_steps_that_are_worth_something_together_alone(first: RunResult) -> None:
+    """Of five hangings that count by twos four are done, of which everything is taken over and nothing later; of six none."""
+    recording = opened(first)
+    steps, left = recording.all_steps().items, left_in(recording, "hang", 2)
+    assert left.steps == steps[:4]
+    assert left.end_ns == steps[3].end_ns
+    assert left.begun == 4
+    assert [e["kind"] for e in opened(first).events()][left.kept - 1] == "step-end"
+    assert max(t_ns for _, t_ns, _ in left.messages()) < steps[4].start_ns + 1_000_000_000
+    procedure = replace(load_procedure("amb-calibration"), whole=lambda _rig, _plan: 6)
+    with pytest.raises(ConfigError, match="found no 6 steps 'hang' in a row that were completed"):
+        stopped.left_of(RunDirectory(first.directory), opened(first), procedure)
+
+
 @pytest.mark.parametrize(("heavier_kg", "told"), [(0.0, False), (0.03, True)])
 def test_another_hanger_is_a_drift_between_the_halves(
     tmp_path: Path, heavier_kg: float, told: bool, monkeypatch: pytest.MonkeyPatch
