@@ -9,18 +9,22 @@ from typing import Any
 
 import numpy as np
 import pytest
-from statics import SHORT, Cells, taken
-from stopped_runs import ran, stopped_after, went_on
+from statics import SHORT, Cells, exchanged, taken
+from stopped_runs import Stopping, ran, stopped_after, went_on
 
 from bench.cli.compose import Request
 from bench.cli.loading import load_procedure
+from bench.cli.virtual import flown
 from bench.errors import ConfigError
-from bench.findings import Effect
+from bench.findings import Effect, Finding
 from bench.record.outcomes import Outcome
 from bench.recording import Recording
 from bench.recording.earlier import AGAIN
 from bench.rigfile import load_rig
+from bench.run import stopped
 from bench.run.runner import RunResult
+from bench.rundir import RunDirectory
+from procedures.shared.continued import DRIFTED
 from procedures.static_characteristics import estimates, halves
 from procedures.static_characteristics.beside import of_controller
 from procedures.static_characteristics.estimates import Result
@@ -69,6 +73,7 @@ def test_the_same_loads_once_more_are_no_change(sound: Result, seed: int) -> Non
     c = changed(sound, taken(RIG, MACHINE, seed=seed))
     assert (np.abs(c.value) < 4 * c.u + c.within).all()
     assert c.u[:2].max() < 3e-3
+    assert min(c.chance, c.shares_chance) > 1e-3
 
 
 @pytest.mark.parametrize(("gain", "number"), [((1.01, 1.0), 0), ((1.0, 1.02), 1)])
@@ -84,6 +89,27 @@ def test_an_encoder_that_reads_more(sound: Result) -> None:
     counts = 2 * MACHINE.pitch[1]
     c = changed(sound, replace(again, angle=again.angle + counts))
     assert c.value[3] == pytest.approx(-counts, abs=4 * c.u[3] + c.within[3])
+
+
+def test_a_phase_that_presses_more_is_named(sound: Result) -> None:
+    """Phase C1 by 2 %, both along and around, as a current sensor would have it; cells and encoders do not explain it."""
+    again, k, more = taken(RIG, MACHINE, seed=1), 2, 1 / 1.02 - 1
+    c = changed(sound, halves.freed_of_phase(again, k, more, PLACE - 1))
+    assert c.chance < 1e-6
+    assert c.shares_chance > 1e-3
+    assert c.shares[k] == pytest.approx(0.02, abs=4 * c.shares_u[k])
+    assert (np.abs(np.delete(c.shares / c.shares_u, k)) < 4).all()
+    drifted = found(parted(sound.taken, halves.freed_of_phase(again, k, more, PLACE)))
+    (told,) = halves.told(c, drifted, RIG, PLACE)
+    assert (told.code, told.where) == (DRIFTED, "C1")
+
+
+def test_what_nothing_explains_decides(sound: Result) -> None:
+    """Two phases are exchanged at the connector meanwhile."""
+    c = changed(sound, exchanged(taken(RIG, MACHINE, seed=1), 1, 2, len(SHORT.levels_A)))
+    (told,) = [f for f in halves.told(c, sound, RIG, PLACE) if not f.where]
+    assert told.effect is Effect.INDETERMINATE
+    assert "neither cells nor encoders nor phases" in told.text
 
 
 def test_readings_are_freed_of_a_change_after_the_seam_alone(sound: Result) -> None:
@@ -135,3 +161,18 @@ def test_stopped_within_a_place_it_goes_on_at_its_beginning(tmp_path: Path) -> N
             assert low - (high - low) / 4 < value < high + (high - low) / 4, one.name
     with pytest.raises(ConfigError, match="cannot be continued with another plan"):
         went_on(first.directory, tmp_path / "c", plan=("levels_A=[2.0, 4.0]",))
+
+
+@pytest.mark.long
+def test_a_cell_that_shows_more_in_the_second_half(tmp_path: Path) -> None:
+    """Through the whole path: its gain is 1 % another one while the machine is off."""
+    run, short = (
+        RunDirectory(tmp_path),
+        {"positions_m": (-13e-3, 0.0, 13e-3), "angles_per_position": 2, "levels_A": (2.0, 5.0)},
+    )
+    half = flown(ASKED.procedure, "rlsrm", 2, short, run.recording, progress=Stopping(3 * EACH))
+    earlier = stopped.left_of(run, stopped.opened(run), load_procedure(ASKED.procedure))
+    gain = {"load_cells.x.gain": half.drawn.values["load_cells.x.gain"] + 0.01}
+    done = flown(ASKED.procedure, "rlsrm", 2, short, tmp_path / "on.mcap", gain, earlier=earlier).analysed()
+    drifts = [f for f in done.results if isinstance(f, Finding) and f.code == DRIFTED]
+    assert [(f.where, f.effect) for f in drifts] == [("x", Effect.INDETERMINATE)]
