@@ -16,6 +16,7 @@ from bench.cli.compose import Request
 from bench.cli.loading import load_procedure
 from bench.cli.virtual import flown
 from bench.findings import Effect, Finding
+from bench.progress import Silent
 from bench.record.outcomes import Outcome
 from bench.recording import Recording
 from bench.recording.earlier import AGAIN
@@ -114,6 +115,25 @@ def test_stopped_again_before_anything_was_repeated(tmp_path: Path) -> None:
     assert result.outcome is Outcome.PASS
     assert len(result.record.continues) == 2
     assert sorted(set(read_torques(opened(result)).steps.half.tolist())) == [0, 1]
+
+
+class Counting(Silent):
+    """How many steps are said to come, and how many come."""
+
+    said = came = 0
+
+    def total(self, steps: int) -> None:
+        self.said = max(self.said, steps)  # 0 when the machine's part ends
+
+    def step(self, text: str) -> None:
+        self.came += 1
+
+
+def test_no_more_steps_come_than_are_said(tmp_path: Path) -> None:
+    """All that comes before the loads is said to come again; the detent's four steps do not."""
+    counting = Counting()
+    went_on(stopped_after(29, tmp_path / "a", ASKED).directory, tmp_path / "b", progress=counting)
+    assert counting.said == counting.came + 4
 
 
 def parted(s: Steps, at: int, base: float = 0.0, scale: float = 0.0, noise: float = 0.0) -> Steps:
