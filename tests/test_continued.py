@@ -31,10 +31,10 @@ from bench.run import reanalysis, runner, stopped
 from bench.run.runner import RunResult
 from bench.run.supervisor import Supervisor
 from bench.rundir import RunDirectory
-from procedures.amb_calibration import halves
+from procedures.shared import continued
 
 PLAN = {"angles": 1, "settle_s": 0.3, "average_s": 0.2}
-DRIFT = (halves.DRIFTED,)
+DRIFT = (continued.DRIFTED,)
 DONE = 5
 """Hangings of nine, the heaviest mass just hung."""
 
@@ -170,6 +170,20 @@ def test_a_continued_run_can_be_continued(first: RunResult, tmp_path: Path) -> N
     assert last.outcome is Outcome.PASS
 
 
+def test_steps_that_are_worth_something_together_alone(first: RunResult) -> None:
+    """Of five hangings that count by twos four are done, of which everything is taken over and nothing later; of six none."""
+    recording = opened(first)
+    steps, left = recording.all_steps().items, left_in(recording, "hang", 2)
+    assert left.steps == steps[:4]
+    assert left.end_ns == steps[3].end_ns
+    assert left.begun == 4
+    assert [e["kind"] for e in opened(first).events()][left.kept - 1] == "step-end"
+    assert max(t_ns for _, t_ns, _ in left.messages()) < steps[4].start_ns + 1_000_000_000
+    procedure = replace(load_procedure("amb-calibration"), whole=lambda _rig, _plan: 6)
+    with pytest.raises(ConfigError, match="found no 6 steps 'hang' in a row that were completed"):
+        stopped.left_of(RunDirectory(first.directory), opened(first), procedure)
+
+
 @pytest.mark.parametrize(("heavier_kg", "told"), [(0.0, False), (0.03, True)])
 def test_another_hanger_is_a_drift_between_the_halves(
     tmp_path: Path, heavier_kg: float, told: bool, monkeypatch: pytest.MonkeyPatch
@@ -187,7 +201,7 @@ def test_another_hanger_is_a_drift_between_the_halves(
         assert drifts[where].effect is Effect.NOTE  # of so few hangings U is wider than what K moves by
         newtons = float(re.search(r"for ([+-][\d.]+) N", drifts[where].text)[1])  # type: ignore[index]
         assert newtons == pytest.approx(-share * heavier_kg * 9.81, abs=0.06)  # what the fit does not find applied
-    monkeypatch.setattr(halves, "MATTERS", 0.05)
+    monkeypatch.setattr(continued, "MATTERS", 0.05)
     recording: Recording[Any] = Recording.open(tmp_path / "whole.mcap", procedure.plan)
     again = {f.where: f.effect for f in procedure.analyse(recording) if isinstance(f, Finding) and f.code in DRIFT}
     assert set(again.values()) == ({Effect.INDETERMINATE} if told else set())
@@ -202,7 +216,7 @@ def test_a_sound_rig_whose_shaft_comes_back_from_the_other_side_is_silent(tmp_pa
     done = flown("amb-calibration", "tsbs12", 2, plan, tmp_path / "whole.mcap", earlier=earlier).analysed()
     told = [f.code for f in done.results if isinstance(f, Finding)]
     assert "continued" in told
-    assert halves.DRIFTED not in told
+    assert continued.DRIFTED not in told
     first, again = done.recording.steps("hang").items[59], done.recording.steps(f"hang{AGAIN}").items[0]
     assert abs(again.mean("angle") - first.mean("angle")) > 2e-3
 

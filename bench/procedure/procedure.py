@@ -68,6 +68,10 @@ def _unknown_count(_: Any) -> int:
     return 0
 
 
+def _each(_rig: RigFile, _plan: Any) -> int:
+    return 1
+
+
 def _no_needs(_: Any) -> tuple[Need, ...]:
     return ()
 
@@ -122,7 +126,8 @@ class Procedure:
     they go by these, and `kinds` are what they were.
 
     `continues` is the kind of its steps at which a run that was stopped can go on; "" where what the machine does between them
-    matters, so that it cannot (`bench.run.stopped`).
+    matters, so that it cannot (`bench.run.stopped`). `whole` are how many of these steps are worth something together alone:
+    readings at a place that is set up once for all of them.
 
     `places` are words that stand in the `where` of what it measures, beside names of the rig and of the plan.
     """
@@ -154,6 +159,7 @@ class Procedure:
     reached: tuple[str, ...] = ()
     assumes: tuple[str, ...] = ()
     continues: str = ""
+    whole: Callable[[RigFile, Any], int] = field(default=_each)
     places: tuple[str, ...] = ()
     kinds: tuple[Quantity, ...] = ()
     method: str = ""  # the report's section: plain paragraphs, parted by empty lines

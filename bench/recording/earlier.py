@@ -63,14 +63,15 @@ class Earlier:
         yield from self.later
 
 
-def left_in(recording: Recording[Any]) -> Earlier:
+def left_in(recording: Recording[Any], kind: str = "", whole: int = 1) -> Earlier:
     """What was completed in a recording: steps that ended, and whose samples are there to their end. What a killed process
-    had not written is not done.
+    had not written is not done. `whole` are the steps of a `kind` that are worth something together alone: of the last ones,
+    fewer than these are not done either, nor is what came after.
 
     Raises:
         RecordingError: it is damaged.
     """
-    steps, events = _completed(recording), recording.events()
+    steps, events = _together(_completed(recording), kind, whole), recording.events()
     end_ns = steps[-1].end_ns if steps else 0
     kept = 1 + max((k for k, e in enumerate(events) if e["kind"] == "step-end" and e["t_ns"] <= end_ns), default=-1)
     ended = {e["step"] for e in events[:kept] if e["kind"] == "step-end"}
@@ -89,6 +90,12 @@ def _completed(recording: Recording[Any]) -> tuple[Step, ...]:
         return ()
     reached = _reached(recording, steps[-1].start_ns) + 2 * recording.streams["telemetry"].period_ns
     return tuple(s for s in steps if s.end_ns <= reached)
+
+
+def _together(steps: tuple[Step, ...], kind: str, whole: int) -> tuple[Step, ...]:
+    numbers = [k for k, s in enumerate(steps) if s.kind == kind]
+    beyond = len(numbers) % whole
+    return steps[: numbers[-beyond]] if beyond else steps
 
 
 def _reached(recording: Recording[Any], after_ns: int) -> int:

@@ -159,9 +159,13 @@ def _moved(
 
 
 def _steps_to_do(job: Job) -> int:
-    """For the progress display; what a stopped run completed is done, and the last of it is repeated."""
+    """For the progress display, no less than there will be; what a stopped run completed of an operator's work is done, and the
+    last of it is repeated, or a part of it. What comes before that work is done anew as far as a lift takes it away."""
     planned = job.procedure.steps(job.rig, job.plan)
-    return planned if job.earlier is None or not planned else planned - len(job.earlier.steps) + 1
+    if job.earlier is None or not planned:
+        return planned
+    done = sum(s.kind == job.procedure.continues for s in job.earlier.steps)
+    return planned - done + job.procedure.whole(job.rig, job.plan)
 
 
 def _take_over(job: Job, earlier: Earlier, recorder: Recorder, clock: Clock, progress: Progress) -> None:

@@ -66,7 +66,8 @@ def left_of(run: RunDirectory, recording: Recording[Any], procedure: Procedure) 
         ConfigError: it came to its end, or nothing was completed.
     """
     try:
-        earlier = left_in(recording)
+        whole = procedure.whole(recording.rig, recording.plan_as(procedure.plan))
+        earlier = left_in(recording, procedure.continues, whole)
         ending = Ending.read(recording)
         done = [s for s in earlier.steps if s.kind == procedure.continues]
         if ending.stopped is None:
@@ -75,8 +76,10 @@ def left_of(run: RunDirectory, recording: Recording[Any], procedure: Procedure) 
                 f"`bench analyse {run.path}`"
             )
         if not done:
+            kind = procedure.continues
+            found = f"no step {kind!r} that was" if whole == 1 else f"no {whole} steps {kind!r} in a row that were"
             raise ConfigError(
-                f"{run.path}: found no step {procedure.continues!r} that was completed: there is nothing to continue{NOTHING} "
+                f"{run.path}: found {found} completed: there is nothing to continue{NOTHING} "
                 f"Next: `bench run {procedure.name} --rig {recording.rig.name}`"
             )
         return replace(earlier, told=_told(run, earlier, ending))

@@ -7,12 +7,12 @@ positions add and what the shaft makes of it that stands some mrad beside where 
 
 with the slope s of the force over the angle. A hanging scatters (its strap seats anew, noise) by the covariance that the fit's
 residuals have, freed of a step between the halves, so that d has twice that variance, and that of an angle by hand. |d| beyond
-Student's t at CHANCE and what a count of the encoder allows is a drift, told with its 95 % interval: of current or
+Student's t at `continued.CHANCE` and what a count of the encoder allows is a drift, told with its 95 % interval: of current or
 position sensors, of the magnets, or a hanger that hangs otherwise.
 
 Sensors cool while the machine is off: what can be seen need not matter. A drift decides where K would move by
-more than MATTERS of its own U: as a step of the force's zero, which moves K at an angle that the seam parts, or, with a mass
-on, as one of its scale, which moves K at every angle after it, whichever is more.
+more than `continued.MATTERS` of its own U: as a step of the force's zero, which moves K at an angle that the seam parts, or,
+with a mass on, as one of its scale, which moves K at every angle after it, whichever is more.
 """
 
 from __future__ import annotations
@@ -34,11 +34,10 @@ from procedures.amb_calibration.plan import Plan
 from procedures.amb_calibration.pulls import Pull, pulls
 from procedures.amb_calibration.scatter import Scatter, scatter
 from procedures.amb_calibration.steps import Hang, HangingData, arrays
+from procedures.shared import continued
 
 Array = npt.NDArray[np.float64]
-DRIFTED, UNCHECKED = "drift-between-halves", "halves-unchecked"
-CHANCE = 1e-3  # that a sound run tells a drift, of all its axes together
-MATTERS = 0.5
+UNCHECKED = "halves-unchecked"
 LOADED = 0.2  # of the load range: less says nothing of a scale
 
 
@@ -112,7 +111,7 @@ def _shifts(f: Fit, after: npt.NDArray[np.bool_], at: tuple[int, int], d: Array)
 def _drifts(found: Difference, data: HangingData, f: Fit, expanded: Sequence[float]) -> Iterator[Finding]:
     from scipy.special import stdtrit
 
-    limit = float(stdtrit(found.dof, 1 - CHANCE / len(found.forces) / 2))
+    limit = float(stdtrit(found.dof, 1 - continued.CHANCE / len(found.forces) / 2))
     k, what = (
         coverage_factor(found.dof),
         str(data.table.labels[found.angle * data.hangings.load.shape[1] + found.place]),
@@ -121,18 +120,14 @@ def _drifts(found: Difference, data: HangingData, f: Fit, expanded: Sequence[flo
         d, u, within = float(found.forces[b]), float(found.u[b]), float(found.within[b])
         if abs(d) <= limit * u + within:
             continue
-        share, matters = abs(d) / float(np.ptp(f.forces[b])), found.shifts[b] > MATTERS * expanded[b]
+        share = abs(d) / float(np.ptp(f.forces[b]))
         text = (
             f"the last hanging before the run was stopped ({what}), done again when it went on, asks the {axis.title} for "
             f"{d:+.3f} N ± {k * u + within:.3f} N more ({share:.2%} of the load range), by which K would move by "
             f"{found.shifts[b]:.2g} N/A (its U is {expanded[b]:.2g} N/A)"
         )
-        if matters:
-            text += (
-                ": something drifted between the halves, a current or position sensor, the magnets, or how the hanger hangs. "
-                "Next: run it anew, all in one"
-            )
-        yield Finding(DRIFTED, text, axis.where, Effect.INDETERMINATE if matters else Effect.NOTE)
+        suspects = "a current or position sensor, the magnets, or how the hanger hangs"
+        yield continued.drifted(text, axis.where, float(found.shifts[b]) / expanded[b], suspects)
 
 
 def _of_pull(recording: Recording[Plan], pull: Pull, kind: str) -> list[Step]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -16,6 +15,7 @@ from procedures.amb_calibration.plan import Plan
 from procedures.amb_calibration.pulls import Pull
 from procedures.amb_calibration.steps import Hang, HangOn, axes, hung
 from procedures.shared import first_look
+from procedures.shared.continued import Done
 from procedures.shared.step_table import record_step
 
 CLEAR_A = 0.1  # a change of a control current that is no noise
@@ -52,42 +52,43 @@ def exercised(rig: Rig, plan: Plan, record: Recorder, pull: Pull, hook: str) -> 
     return True
 
 
-def hung_up_and_down(
-    rig: Rig, plan: Plan, record: Recorder, pull: Pull, hook: str, done: Sequence[Mapping[str, Any]]
-) -> bool:
-    """False where a bearing pulls with one coil alone, which no hanging changes. Of the steps `done` by a run that this one
-    continues the last one is repeated, and none of the others."""
-    again = len(done) - 1  # number of that step, of all on this hook; -1 where there is none
-    for turn in range(max(again, 0) // len(sequence(plan)), plan.angles):
-        angle = _turned(rig, plan, turn, done)
-        for k, (load, branch) in enumerate(sequence(plan)):
-            number = turn * len(sequence(plan)) + k
-            if number < again:
+def hung_up_and_down(rig: Rig, plan: Plan, record: Recorder, pull: Pull, hook: str, done: Done, first: int) -> bool:
+    """False where a bearing pulls with one coil alone, which no hanging changes. `first` is the number of the first step on
+    this hook. Of the steps `done` by a run that this one continues the last one is repeated, and none of the others."""
+    each = len(sequence(plan))
+    for turn in range(plan.angles):
+        begin = first + turn * each
+        if done.leaves_out(begin + each - 1):
+            continue
+        angle = _turned(rig, plan, turn, done, begin)
+        for number, (load, branch) in enumerate(sequence(plan), begin):
+            if done.leaves_out(number):
                 continue
-            if number == again:
-                load = Load(str(done[again]["load"]))  # what really hung
+            if done.repeats(number):
+                load = Load(str(done.labels[number]["load"]))  # what really hung
                 _from_above(rig, plan, load, branch, hook)
             hanging = rig.operator.hang(replace(load, hook=hook))
             rig.clock.sleep(plan.settle_s)
-            if number == 0 and (needed := both_coils.at_no_load(pull, rig.levitation.reading, plan.bias_A)):
+            if number == first and (needed := both_coils.at_no_load(pull, rig.levitation.reading, plan.bias_A)):
                 record.event(both_coils.ONE_SIDED, needed=needed)
                 return False
             labels = HangOn(angle, hanging.label, branch, hook) if hook else Hang(angle, hanging.label, branch)
-            with record_step(record, labels, again=number == again):
+            with record_step(record, labels, again=done.repeats(number)):
                 rig.clock.sleep(plan.average_s)
     return True
 
 
-def _turned(rig: Rig, plan: Plan, turn: int, done: Sequence[Mapping[str, Any]]) -> float:
-    """The shaft at an angle; one at which hangings are done it must stand at again, as near as anybody reads it.
+def _turned(rig: Rig, plan: Plan, turn: int, done: Done, first: int) -> float:
+    """The shaft at an angle, whose first hanging has the number `first`; one at which hangings are done it must stand at again,
+    as near as anybody reads it.
 
     Raises:
         RotorNotArrived: it stands elsewhere.
     """
-    first = turn * len(sequence(plan))
-    wanted = float(done[first]["angle_rad"]) if first < len(done) else 2 * math.pi * turn / plan.angles
+    begun = first < len(done.labels)
+    wanted = float(done.labels[first]["angle_rad"]) if begun else 2 * math.pi * turn / plan.angles
     angle = turns.turn(rig, wanted, plan.angles)
-    if first < len(done) and angle != wanted:
+    if begun and angle != wanted:
         raise RotorNotArrived(
             f"the shaft stands at {math.degrees(angle):g}°; expected {math.degrees(wanted):g}°, where the hangings of the "
             "stopped run were done. Next: continue once more, and turn it there"

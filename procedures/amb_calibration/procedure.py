@@ -38,7 +38,7 @@ from procedures.amb_calibration.pulls import Loaded, Pull, pulls
 from procedures.amb_calibration.scatter import Scatter, covariance_by_angle, covariance_over_a_turn, outputs, scatter
 from procedures.amb_calibration.steps import Hang, HangingData, channels, hung, read_hangings
 from procedures.servomotor.loads import check_masses
-from procedures.shared import assumptions
+from procedures.shared import assumptions, continued
 from procedures.shared.default_masses import by_weight
 from procedures.shared.weight import weight
 
@@ -62,14 +62,14 @@ def step_count(plan: Plan) -> int:
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Hang every mass up and down at each angle, on each hook; its hanger stays on throughout. A run that goes on with a
     stopped one exercises the magnets anew, for they were off, and begins with the last hanging that was done."""
-    found, done, each = pulls(rig.file), record.completed(Hang.kind), step_count(plan)
+    found, done, each = pulls(rig.file), continued.done(record, Hang.kind), step_count(plan)
     for number, pull in enumerate(found):
-        hook, of_hook = pull.hook if len(found) > 1 else "", done[number * each : (number + 1) * each]
-        if len(of_hook) == each and len(done) > (number + 1) * each:
+        hook, first = pull.hook if len(found) > 1 else "", number * each
+        if done.leaves_out(first + each - 1):
             continue  # the last hanging of all is on another hook
         if not exercised(rig, plan, record, pull, hook):
             return
-        if not hung_up_and_down(rig, plan, record, pull, hook, of_hook):
+        if not hung_up_and_down(rig, plan, record, pull, hook, done, first):
             return
 
 

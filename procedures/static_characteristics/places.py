@@ -38,3 +38,10 @@ def loads(plan: Plan, some: Sequence[Phase]) -> Iterator[Load]:
     for phase in some:
         yield from (Load(phase.name, level) for level in plan.levels_A)
     yield Load(NOTHING, 0.0, 1)
+
+
+def repeated(plan: Plan, some: Sequence[Phase]) -> tuple[int, ...]:
+    """Numbers of the loads that are read again at the last place of a run that was stopped: nothing, all phases at the greatest
+    current, and nothing again."""
+    per = len(plan.levels_A)
+    return (0, *(per * (k + 1) for k in range(len(some))), per * len(some) + 1)

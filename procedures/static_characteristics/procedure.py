@@ -20,16 +20,18 @@ from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.procedure.states import transition
 from bench.recording import Recording
+from bench.recording.earlier import AGAIN
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
+from procedures.shared import continued
 from procedures.stages import assumptions
 from procedures.stages.stators import POLES, axis, lacks, phases
-from procedures.static_characteristics import checks, estimates
+from procedures.static_characteristics import checks, estimates, halves
 from procedures.static_characteristics import figures as drawn
 from procedures.static_characteristics.beside import Beside, by_flux, of_controller
 from procedures.static_characteristics.estimates import Result
-from procedures.static_characteristics.places import SIDES, Load, grid, loads
+from procedures.static_characteristics.places import SIDES, Load, grid, loads, repeated
 from procedures.static_characteristics.plan import Plan
 from procedures.static_characteristics.steps import READ, READING, STATE, Cell, cells, read_taken
 
@@ -68,16 +70,27 @@ def step_count(plan: Plan) -> int:
 
 def steps_on(rig: RigFile, plan: Plan) -> int:
     """How many it records on a rig."""
-    return 2 * len(grid(plan)) * len([*loads(plan, phases(rig))])
+    return len(grid(plan)) * whole(rig, plan)
+
+
+def whole(rig: RigFile, plan: Plan) -> int:
+    """Readings at a place: each needs the zeros of the cells as they are mounted there."""
+    return len(SIDES) * len([*loads(plan, phases(rig))])
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
-    """From place to place: sent there, taken by the cells, let go; each load is read from both sides."""
+    """From place to place: sent there, taken by the cells, let go; each load is read from both sides. A run that goes on with a
+    stopped one reads the greatest loads of the last place again, and goes on at the next."""
     assert rig.motion is not None
-    some, both, numbers = phases(rig.file), cells(rig.file), count()
+    some, both, done = phases(rig.file), cells(rig.file), continued.done(record, READING)
     assert both is not None
-    by_name = {p.name: p.value for p in some}
+    by_name, each = {p.name: p.value for p in some}, whole(rig.file, plan)
+    numbers = count(len(done.labels) + len(record.completed(READING + AGAIN)))
     for place in grid(plan):
+        last = (place.number + 1) * each - 1
+        if done.leaves_out(last):
+            continue
+        again = done.repeats(last)
         transition(rig, RigState.HELD)
         rig.motion.move({both[0].axis.name: place.x, both[1].axis.name: place.angle})
         rig.clock.sleep(plan.settle_s)
@@ -87,10 +100,13 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
         assert test is not None
         try:
             for number, load in enumerate(loads(plan, some)):
+                if again and number not in repeated(plan, some):
+                    continue
                 _carry(rig, by_name.get(load.phase, test.off), load)
                 for side in SIDES:
                     rig.operator.wind(side)
-                    _read(rig, plan, record, both, next(numbers), {"place": place.number, "load": number, "side": side})
+                    labels = {"number": next(numbers), "place": place.number, "load": number, "side": side}
+                    _read(rig, plan, record, both, labels, again)
         finally:
             _carry(rig, test.off, Load("", 0.0))
         rig.operator.mount("")
@@ -107,17 +123,17 @@ def _carry(rig: Rig, phase: float, load: Load) -> None:
 
 
 def _read(
-    rig: Rig, plan: Plan, record: Recorder, both: tuple[Cell, Cell], number: int, labels: Mapping[str, object]
+    rig: Rig, plan: Plan, record: Recorder, both: tuple[Cell, Cell], labels: Mapping[str, object], again: bool
 ) -> None:
-    shown = {}
-    with record.step(READING, number=number, **labels):
+    with record.step(READING + AGAIN if again else READING, **labels):
         for cell in both:
             if not cell.by.channel:
-                shown[cell.axis.name] = rig.operator.read_cell(cell.axis.name, cell.by.instrument, cell.unit)
+                value = rig.operator.read_cell(cell.axis.name, cell.by.instrument, cell.unit)
+                record.event(
+                    READ, number=labels["number"], axis=cell.axis.name, value=value
+                )  # a step without it is none
         if any(cell.by.channel for cell in both):
             rig.clock.sleep(plan.window_s)
-    for name, value in shown.items():
-        record.event(READ, number=number, axis=name, value=value)
 
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
@@ -130,6 +146,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
         result = estimates.result(taken, rig, max(plan.levels_A), _beside(recording))
     except AnalysisError as error:
         findings.end(Finding("map-not-determined", f"{error}.", "", Effect.ERROR))
+    findings.add(halves.findings(recording, result))
     findings.add(checks.of_results(result, plan))
     return result
 
@@ -227,6 +244,8 @@ procedure = Procedure(
     requires=requires,
     check=check,
     step_count=step_count,
+    continues=READING,
+    whole=whole,
     steps_on=steps_on,
     fewest_steps=lambda plan: 2 * checks.FEWEST * (2 + len(plan.levels_A)),
     needs=needs,

@@ -75,15 +75,20 @@ def cells(rig: RigFile) -> tuple[Cell, Cell] | None:
 
 def read_taken(recording: Recording[Plan]) -> Taken:
     """Every reading."""
+    return taken_at(recording, grid(recording.plan), recording.steps(READING).items)
+
+
+def taken_at(recording: Recording[Plan], places: Sequence[Place], steps: Sequence[Step]) -> Taken:
+    """What was read at these places, in steps that are of them; not all loads need be there."""
     rig, plan = recording.rig, recording.plan
-    both, some, places = cells(rig), phases(rig), grid(plan)
+    both, some, rows = cells(rig), phases(rig), {p.number: k for k, p in enumerate(places)}
     assert both is not None
     shown = {(e["number"], e["axis"]): float(e["value"]) for e in recording.events(READ)}
     shape = (len(places), 2 + len(some) * len(plan.levels_A), 2)
     found, times, currents = np.full((*shape, 2), np.nan), np.full(shape, np.nan), np.full((*shape, len(some)), np.nan)
-    read, names, steps = np.full((*shape, 2), np.nan), set[str](), recording.steps(READING)
+    read, names = np.full((*shape, 2), np.nan), set[str]()
     for step in steps:
-        at = int(step.labels["place"]), int(step.labels["load"]), SIDES.index(step.labels["side"])
+        at = rows[int(step.labels["place"])], int(step.labels["load"]), SIDES.index(step.labels["side"])
         data = step.read(*(c.axis.channel for c in both), *(p.current for p in some), STATE)
         if not len(data[STATE]):
             continue

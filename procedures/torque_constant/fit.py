@@ -30,7 +30,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -47,9 +47,11 @@ Ints = npt.NDArray[np.int64]
 class Steps:
     """Step means in time order, (n,) each but `segments` (n, k), the k currents along the field.
 
-    segments: A, as the current sensors read; angle: rad, of the rotor (`resting`); gamma: rad; time: s, middle of the step
+    segments: A, as the current sensors read; angle: rad, of the rotor (`resting`); gamma: rad; time: s, middle of the
+    step, less the pauses of a run that was stopped and continued
     side: +1 left, -1 right, 0 no load; load: index into the masses, -1 for nothing
     spread: A, standard deviation of the torque current's samples: large where the angle jumps between two counts
+    half: number of the half, from 0, of a run that was stopped and continued; () is one that never was
     """
 
     segments: Array
@@ -59,6 +61,7 @@ class Steps:
     side: Ints
     load: Ints
     spread: Array
+    half: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
 
 
 @dataclass(frozen=True)
@@ -229,7 +232,8 @@ def balance(
 
 
 def _lines_in_time(s: Steps) -> Array:
-    """Columns of i_base, (n, 2 k): at each of the k phase angles a constant and a slope in time.
+    """Columns of i_base, (n, 2 k): at each of the k phase angles a constant and a slope in time; and (n, 1) more for each time
+    that the run was stopped within one: a step, for sensors' zeros and where the rotor rests are other ones after a lift.
 
     Raises:
         AnalysisError: too few phase angles, or one that lacks loads or steps without load.
@@ -247,4 +251,15 @@ def _lines_in_time(s: Steps) -> Array:
             )
         lines[mine, 2 * k] = 1
         lines[mine, 2 * k + 1] = s.time[mine] - s.time[mine].mean()
-    return lines
+    return np.column_stack([lines, *_steps_at_seams(s, index)])
+
+
+def _steps_at_seams(s: Steps, index: Ints) -> list[Array]:
+    """A column (n,) for each phase angle and seam that parts it."""
+    out = []
+    for half in range(1, int(s.half.max(initial=0)) + 1):
+        for k in np.unique(index):
+            after = (s.half >= half) & (index == k)
+            if after.any() and not after[index == k].all():
+                out.append(after.astype(np.float64))
+    return out

@@ -29,9 +29,10 @@ from procedures.servomotor.conventions import conventions
 from procedures.servomotor.direction import of_probe
 from procedures.servomotor.loads import check_masses
 from procedures.servomotor.parameters import BIASES, CURRENTS, named, needed, stated, write
-from procedures.shared import assumptions, first_look
+from procedures.shared import assumptions, continued, first_look
+from procedures.shared.continued import Done
 from procedures.shared.step_table import of_samples, record_step
-from procedures.torque_constant import checks, fit
+from procedures.torque_constant import checks, fit, halves
 from procedures.torque_constant import figures as drawn
 from procedures.torque_constant.fit import NO_DETENT, Balance, Detent
 from procedures.torque_constant.inputs import SIDES, arms_u, fit_inputs, masses_u
@@ -84,14 +85,16 @@ def step_count(plan: Plan) -> int:
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
-    """Look at the wiring and the detent without load, then hang every mass on both ends at every phase angle."""
+    """Look at the wiring and the detent without load, then hang every mass on both ends at every phase angle. A run that goes
+    on with a stopped one looks at the wiring again, for it is lifted anew, and begins with the last step that was done."""
+    done, each = continued.done(record, OnLever.kind), len(sequence(plan))
     hold.probe(rig, record)
     hold.hold(rig, plan.ki_theta)
     if not _at_home(rig, record, 0.0):
         return
     if not _wiring(rig, plan, record):
         return
-    for k in range(plan.detent_angles):
+    for k in range(0 if done.labels else plan.detent_angles):
         angle = 2 * math.pi / detent_order(rig.file) * k / plan.detent_angles
         if not _at_home(rig, record, angle):
             return
@@ -100,9 +103,11 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
             rig.clock.sleep(plan.average_s)
     if not _at_home(rig, record, 0.0):
         return
-    for gamma in visits(plan):
+    for visit, gamma in enumerate(visits(plan)):
+        if done.leaves_out((visit + 1) * each - 1):
+            continue
         write(rig, {"motor.phase": gamma})
-        if not _loads(rig, plan, record, gamma):
+        if not _loads(rig, plan, record, gamma, done, visit * each):
             return
     write(rig, {"motor.phase": 0.0})
     hold.hold(rig)
@@ -138,23 +143,28 @@ def _wiring(rig: Rig, plan: Plan, record: Recorder) -> bool:
     return first_look.passes(rig, record, checks.wiring(wiring(of_samples(*zip(*seen, strict=True)), machine), machine))
 
 
-def _loads(rig: Rig, plan: Plan, record: Recorder, gamma: float) -> bool:
-    """All loads at one phase angle; False where those on the left, at the first angle, show a wrong sign and nobody says to
-    go on."""
+def _loads(rig: Rig, plan: Plan, record: Recorder, gamma: float, done: Done, begin: int) -> bool:
+    """All loads at one phase angle, whose first step has the number `begin`; False where those on the left, at the first angle,
+    show a wrong sign and nobody says to go on. Of the steps `done` by a run that this one continues the last one is repeated,
+    and none of the others."""
     hanging, machine = "", conventions(rig.file)
     seen: list[list[float]] = []
-    for side, load in sequence(plan):
+    for number, (side, load) in enumerate(sequence(plan), begin):
+        if done.leaves_out(number):
+            continue
+        if done.repeats(number):
+            load = Load(str(done.labels[number]["load"]))  # what really hung
         if hanging and hanging != side:
             rig.operator.lever("left" if hanging == "left" else "right", NOTHING)
         if side:
             load = rig.operator.lever("left" if side == "left" else "right", load)
         hanging = side
         rig.clock.sleep(plan.settle_s)
-        with record_step(record, OnLever(gamma, side, load.label)):
+        with record_step(record, OnLever(gamma, side, load.label), again=done.repeats(number)):
             read = first_look.watched(rig, record, machine.turning, plan.average_s)
         seen.append([read[name] for name in machine.turning])
-        first = gamma == visits(plan)[0] and len(seen) == len(plan.masses) + 2
-        if first and not first_look.passes(rig, record, checks.segments(np.array(seen), machine)):
+        left_done = number == len(seen) - 1 == len(plan.masses) + 1
+        if left_done and not first_look.passes(rig, record, checks.segments(np.array(seen), machine)):
             return False
     return True
 
@@ -185,6 +195,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     a = _fitted(recording, data)
     values = {name: e.value for name, e in a.inputs.items()}
     mass_u = masses_u(recording.rig, plan.masses)
+    findings.add(halves.findings(recording, a.detent, values, a.balance.pole_pairs, a.estimates))
     findings.add(checks.of_fit(data, machine, a.balance, a.detent, values, mass_u, arms_u(recording.rig), plan))
     return a
 
@@ -274,6 +285,7 @@ procedure = Procedure(
     check=check,
     settings=settings,
     step_count=step_count,
+    continues=OnLever.kind,
     reached=("masses/*", "!masses/density", "geometry/lever_*"),
     assumes=assumptions.TORQUE_CONSTANT,
     method=read_method(__file__),

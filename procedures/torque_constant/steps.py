@@ -10,14 +10,17 @@ import numpy.typing as npt
 
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
+from bench.recording.earlier import AGAIN
 from bench.rigfile.roles import ANGLE, STATUS
 from procedures.servomotor.conventions import Servomotor, conventions
 from procedures.servomotor.loads import load_index
+from procedures.shared.continued import half_of
 from procedures.shared.step_table import Labels, Read, Samples, StepTable, tabulate
 from procedures.torque_constant.fit import Steps, resting
 from procedures.torque_constant.plan import Plan
 
 Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
 
 
 def channels(machine: Servomotor) -> tuple[str, ...]:
@@ -79,28 +82,45 @@ def read_torques(recording: Recording[Plan]) -> TorqueData:
     Raises:
         AnalysisError: there are none, too few samples in one, or what hung is no mass of the plan.
     """
-    masses, table = recording.plan.masses, _table(recording, OnLever)
+    table = _table(recording, OnLever)
     if not len(table):
         raise AnalysisError("found no loads on the lever (was the run stopped early?)")
-    segments = conventions(recording.rig).turning
-    sides = {"left": 1, "right": -1, "": 0}
-    steps = Steps(
-        np.ascontiguousarray(table.stack(segments).T),
-        resting(table.mean[ANGLE], recording.plan.count_rad),
-        table.each(lambda step: step.gamma_rad),
-        ((table.start_ns + table.end_ns) / 2 - table.start_ns[0]) * 1e-9,
-        np.array([sides[step.side] for step in table.labels]),
-        load_index([step.load for step in table.labels], masses, "lever"),
-        table.spread["torque"],
-    )
     detent = _table(recording, OverDetent)
     return TorqueData(
-        steps, masses, table, detent.mean[ANGLE], detent.stack(segments).mean(axis=0),
-        read_wiring(recording),
+        _steps(recording, table), recording.plan.masses, table, detent.mean[ANGLE], detent.stack(
+            conventions(recording.rig).turning).mean(axis=0), read_wiring(recording),
     )  # fmt: skip
 
 
-def _table(recording: Recording[Plan], kind: type[Read]) -> StepTable[Read]:
+def read_all(recording: Recording[Plan]) -> Steps:
+    """The steps with those that repeat the last one before a stop."""
+    return _steps(recording, _table(recording, OnLever, "", AGAIN))
+
+
+def _steps(recording: Recording[Plan], table: StepTable[OnLever]) -> Steps:
+    half = half_of(recording, table.start_ns)
+    sides = {"left": 1, "right": -1, "": 0}
+    return Steps(
+        np.ascontiguousarray(table.stack(conventions(recording.rig).turning).T),
+        resting(table.mean[ANGLE], recording.plan.count_rad),
+        table.each(lambda step: step.gamma_rad),
+        ((table.start_ns + table.end_ns) / 2 - table.start_ns[0] - paused(table, half)) * 1e-9,
+        np.array([sides[step.side] for step in table.labels]),
+        load_index([step.load for step in table.labels], recording.plan.masses, "lever"),
+        table.spread["torque"],
+        half,
+    )
+
+
+def paused(table: StepTable[OnLever], half: Ints) -> Array:
+    """How long a run that was continued had rested before each step, ns: what drifts does so while the machine runs. A pause is
+    from the end of a step to the start of the next, less what lies between two others at least."""
+    between = table.start_ns[1:] - table.end_ns[:-1]
+    pauses = np.where(np.diff(half) > 0, between - between.min(initial=between.max(initial=0)), 0)
+    return np.concatenate([[0], np.cumsum(pauses)]).astype(np.float64)
+
+
+def _table(recording: Recording[Plan], kind: type[Read], *ends: str) -> StepTable[Read]:
     machine = conventions(recording.rig)
 
     def samples(step: Step) -> Samples:
@@ -114,7 +134,8 @@ def _table(recording: Recording[Plan], kind: type[Read]) -> StepTable[Read]:
         return data
 
     reduced = (*machine.segments, ANGLE, "torque", "side_x", "side_y")
-    return tabulate(list(recording.steps(kind.kind)), kind, reduced, read=samples)
+    steps = [s for s in recording.all_steps() if s.kind in [kind.kind + end for end in ends or ("",)]]
+    return tabulate(steps, kind, reduced, read=samples)
 
 
 def read_wiring(recording: Recording[Plan]) -> Array:

@@ -121,10 +121,11 @@ def test_a_run_with_nothing_completed(bench: Bench, tmp_path: Path) -> None:
 
 
 def test_a_procedure_that_cannot_go_on_in_the_middle_says_which_can(bench: Bench, tmp_path: Path) -> None:
-    path = stopped_after(0, tmp_path / "runs", Request("torque-constant", "tsbs12", seed=1)).directory
+    path = stopped_after(0, tmp_path / "runs", Request("spindown", "tsbs12", seed=1)).directory
     said = refused(bench, path)
-    assert "torque-constant cannot be continued" in said
-    assert "amb-calibration" in said
+    assert "spindown cannot be continued" in said
+    assert "expected one of amb-calibration, torque-constant" in said
+    assert "Next: `bench run spindown --rig tsbs12` anew" in " ".join(said.split())
 
 
 def test_without_a_recording_or_a_run(bench: Bench, first: RunResult, tmp_path: Path) -> None:
