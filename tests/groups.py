@@ -28,6 +28,9 @@ GROUPS = {
                       "test_docs.py::test_commands_work[lift-off]",
                       "test_docs.py::test_commands_work[negative-stiffness]"),
 }  # fmt: skip
+COMPUTED = ("tests/links/test_own_controller.py", "tests/links/test_bound_rig.py::test_a_calibration",
+            "tests/links/test_protection_trips.py::test_each_protected_reading_trips")  # fmt: skip
+"""In the rooms of links, and in one process: their clock is simulated, and they keep up with nothing."""
 PAGES = "tests/test_docs.py::test_commands_work"
 """Long tests of one file that share nothing: each goes to whichever worker is free."""
 
@@ -42,6 +45,8 @@ NICE = 10  # of workers that only compute: those that must keep up with wall tim
 def group_of(nodeid: str) -> str:
     """The group's name; where there is none the file, whose fixtures are then made by one worker only."""
     whole = nodeid if nodeid.startswith(PAGES) else nodeid.partition("::")[0]
+    if nodeid.startswith(COMPUTED):
+        return whole
     return next((name for name, parts in GROUPS.items() if any(part in nodeid for part in parts)), whole)
 
 

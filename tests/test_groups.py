@@ -16,6 +16,9 @@ ROOT = Path(__file__).parent.parent
 def test_every_part_names_something() -> None:
     assert groups.REAL_TIME in groups.GROUPS
     parts = [part for parts in groups.GROUPS.values() for part in parts]
+    for name in groups.COMPUTED:
+        file, _, test = name.partition("::")
+        assert f"def {test}" in (ROOT / file).read_text(encoding="utf-8"), name
     for part in (*parts, *(name for name in groups.FIRST if name != groups.REAL_TIME)):
         file, _, page = part.partition("::test_commands_work")
         if page:
@@ -29,6 +32,12 @@ def test_every_part_names_something() -> None:
     [
         ("tests/firmware/test_line_drivers.py::test_x", "real-time"),
         ("tests/links/test_killed.py::test_a_killed_rig_is_noticed", "real-time"),
+        ("tests/links/test_own_controller.py::test_x[1]", "tests/links/test_own_controller.py"),
+        ("tests/links/test_protection_trips.py::test_each_protected_reading_of_the_served_rig_trips[a]", "real-time"),
+        (
+            "tests/links/test_protection_trips.py::test_each_protected_reading_trips_and_the_machine_is_safe[a]",
+            "tests/links/test_protection_trips.py",
+        ),
         ("tests/drivers/test_heartbeat_alone.py::test_x[1]", "real-time"),
         ("tests/test_docs.py::test_commands_work[connect-a-rig]", "real-time"),
         ("tests/test_docs.py::test_commands_work[force-coupling]", "chained pages"),
