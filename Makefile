@@ -31,7 +31,7 @@ types: setup
 bytecode: setup
 	@$(BIN)/python -m pytest -q --collect-only > /dev/null || true
 
-# One worker waits for links in real time first, two compute and give way to it (tests/groups.py). Only files with long tests are read.
+# Two workers wait for links in real time first, the third computes and gives way (tests/groups.py). Only files with long tests are read.
 ci-long: setup
 	$(BIN)/python -m pytest -q -m "long and not links" -n 3 --dist loadgroup --durations=60 --durations-min=10 \
 	    $$(grep -rlE "mark\.(long|faults)" tests --include="test_*.py")
