@@ -80,12 +80,15 @@ def test_what_keeps_up_with_wall_time_goes_first_and_is_not_given_less_of_the_pr
     base = os.nice(0)
     yields = max(base, groups.NICE)
     test = "import os, pytest\n@pytest.mark.parametrize('k', range({}))\ndef test_{}(k): assert os.nice(0) == {}\n"
-    for name, count, nice in (("firmware", 4, base), ("links", 3, base), ("sim", 40, yields), ("wire", 30, yields)):
-        (tmp_path / "tests" / name).mkdir(parents=True)
-        (tmp_path / "tests" / name / f"test_{name}.py").write_text(test.format(count, name, nice))
+    files = (("firmware/test_a", 4, base), ("links/test_b", 3, base), ("links/test_chain", 2, base),
+             ("sim/test_c", 40, yields), ("wire/test_d", 30, yields))  # fmt: skip
+    for name, count, nice in files:
+        path = tmp_path / "tests" / f"{name}.py"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(test.format(count, path.stem, nice))
     done = subprocess.run(
         [sys.executable, "-m", "pytest", "-q", "-n", "2", "--dist", "loadgroup", "-p", "no:cacheprovider",
          "-p", "no:hypothesispytest"], cwd=tmp_path, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout
-    assert "77 passed" in done.stdout
+    assert "79 passed" in done.stdout
