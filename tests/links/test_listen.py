@@ -48,7 +48,7 @@ def test_it_hears_another_host_at_work_and_does_not_disturb_it(
     with served(tmp_path) as there:
         url = there.endpoints["slcan:socket"]
         with bench(
-            tmp_path, *live(there, "slcan:socket", "tiny-levitated", "--plan", "seconds=5", "--no-report")
+            tmp_path, *live(there, "slcan:socket", "tiny-levitated", "--plan", "seconds=8", "--no-report")
         ) as run:
             there.child.wait_for("-> LEVITATED")
             links = ("--link", f"fieldbus={there.endpoints['modbus-tcp']}", "--poll")
@@ -62,7 +62,7 @@ def test_it_hears_another_host_at_work_and_does_not_disturb_it(
 
 def test_a_pty_that_another_host_has_is_refused_by_name(tmp_path: Path) -> None:
     with served(tmp_path) as there:
-        with bench(tmp_path, *live(there, "slcan:pty", "tiny-levitated", "--plan", "seconds=5", "--no-report")) as run:
+        with bench(tmp_path, *live(there, "slcan:pty", "tiny-levitated", "--plan", "seconds=8", "--no-report")) as run:
             there.child.wait_for("-> LEVITATED")
             refused = ("listen", "tsbs12", "--link", f"controller={there.endpoints['slcan:pty']}", "--seconds", "1")
             with real_bench(tmp_path, *refused) as child:
