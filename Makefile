@@ -9,7 +9,7 @@ READY := .venv/.ready
 # Tests start hundreds of processes: without its bytecode every one of them would compile the project again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test check format ci-long faults links browser pictures fuzz campaigns plants sound moved golden former bench clean lock setup wheel site gallery
+.PHONY: demo test check types bytecode format ci-long faults links browser pictures fuzz campaigns plants sound moved golden former bench clean lock setup wheel site gallery
 
 demo: setup
 	$(BIN)/bench run amb-calibration --rig tsbs12 --seed 1
@@ -20,13 +20,20 @@ test: setup
 check: setup
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
-	$(BIN)/mypy
-	$(BIN)/lint-imports
+	$(MAKE) -j 2 types bytecode
 	$(MAKE) test
 
-# One worker waits for links in real time first, the other computes (tests/groups.py). Only files with long tests are read.
+types: setup
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+# In a fresh clone each worker would rewrite the assertions of all tests, at once. What is wrong here is told by `make test`.
+bytecode: setup
+	@$(BIN)/python -m pytest -q --collect-only > /dev/null || true
+
+# Two workers wait for links in real time first, the third computes and gives way (tests/groups.py). Only files with long tests are read.
 ci-long: setup
-	$(BIN)/python -m pytest -q -m "long and not links" -n 2 --dist loadgroup --durations=60 --durations-min=10 \
+	$(BIN)/python -m pytest -q -m "long and not links" -n 3 --dist loadgroup --durations=60 --durations-min=10 \
 	    $$(grep -rlE "mark\.(long|faults)" tests --include="test_*.py")
 
 faults: setup

@@ -9,8 +9,11 @@ from __future__ import annotations
 import os
 from typing import Any
 
-REAL_TIME = "real-time"
+REAL_TIME, PATIENT = "real-time", "patient"
 GROUPS = {
+    # They wait for minutes, take a third of a core, and their watchdogs have seconds: one after the other beside REAL_TIME.
+    PATIENT: ("tests/links/test_chain.py", "tests/links/test_continued_served.py", "tests/links/test_live_one_axis.py",
+              "tests/links/test_live_runup.py", "tests/links/test_live_lift_off.py"),
     # Their processes keep up with wall time, and mostly wait: one after the other, for two at once were too many beside others.
     REAL_TIME: ("tests/links/", "tests/firmware/", "tests/cli/test_serve.py", "tests/drivers/test_heartbeat",
                 "tests/drivers/test_live_link.py", "tests/drivers/test_fieldbus_live.py",
@@ -28,10 +31,13 @@ GROUPS = {
                       "test_docs.py::test_commands_work[lift-off]",
                       "test_docs.py::test_commands_work[negative-stiffness]"),
 }  # fmt: skip
+COMPUTED = ("tests/links/test_own_controller.py", "tests/links/test_bound_rig.py::test_a_calibration",
+            "tests/links/test_protection_trips.py::test_each_protected_reading_trips")  # fmt: skip
+"""In the rooms of links, and in one process: their clock is simulated, and they keep up with nothing."""
 PAGES = "tests/test_docs.py::test_commands_work"
 """Long tests of one file that share nothing: each goes to whichever worker is free."""
 
-FIRST = (REAL_TIME, f"{PAGES}[loop-response]", "tests/test_described.py", "tests/test_machines.py",
+FIRST = (REAL_TIME, PATIENT, f"{PAGES}[loop-response]", "tests/test_described.py", "tests/test_machines.py",
          "tests/procedures/test_maximum_speed.py", "tests/procedures/test_coverage_long.py",
          "tests/procedures/test_moved_long.py", "tests/procedures/test_bearing_constant.py",
          "tests/procedures/test_load_response_run.py")  # fmt: skip
@@ -42,6 +48,8 @@ NICE = 10  # of workers that only compute: those that must keep up with wall tim
 def group_of(nodeid: str) -> str:
     """The group's name; where there is none the file, whose fixtures are then made by one worker only."""
     whole = nodeid if nodeid.startswith(PAGES) else nodeid.partition("::")[0]
+    if nodeid.startswith(COMPUTED):
+        return whole
     return next((name for name, parts in GROUPS.items() if any(part in nodeid for part in parts)), whole)
 
 
@@ -63,6 +71,6 @@ def scheduler(config: Any, log: Any) -> Any:
 
 def give_way(nodeid: str) -> None:
     """Before a test on a worker among several: what only computes lets those go first that must keep up with wall time. There
-    is no way back for this worker, which is why their group is handed out before all others."""
-    if "PYTEST_XDIST_WORKER" in os.environ and hasattr(os, "nice") and group_of(nodeid) != REAL_TIME:
+    is no way back for this worker, which is why their groups are handed out before all others."""
+    if "PYTEST_XDIST_WORKER" in os.environ and hasattr(os, "nice") and group_of(nodeid) not in (REAL_TIME, PATIENT):
         os.nice(max(NICE - os.nice(0), 0))

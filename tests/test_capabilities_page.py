@@ -10,7 +10,11 @@ from bench import catalogue
 from bench.cli import capabilities_page
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "reference" / "rig-file.md"
-ON = capabilities_page.rigs()
+
+
+@pytest.fixture(scope="module")
+def table() -> str:
+    return capabilities_page.table(capabilities_page.rigs())
 
 
 def test_the_page_has_the_table_of_today() -> None:
@@ -20,17 +24,15 @@ def test_the_page_has_the_table_of_today() -> None:
     )
 
 
-def test_every_procedure_has_a_line_and_a_rig_that_runs_it() -> None:
-    rows = [
-        line.strip("| ").split(" | ") for line in capabilities_page.table(ON).splitlines() if line.startswith("| [")
-    ]
+def test_every_procedure_has_a_line_and_a_rig_that_runs_it(table: str) -> None:
+    rows = [line.strip("| ").split(" | ") for line in table.splitlines() if line.startswith("| [")]
     assert len(rows) == len(catalogue.PROCEDURES)
     assert all("needed" in row for row in rows)
 
 
-def test_what_some_rigs_lack_is_used() -> None:
+def test_what_some_rigs_lack_is_used(table: str) -> None:
     """A controller with no choice of law runs the steps as it is set; without set points it runs none."""
-    (row,) = (line for line in capabilities_page.table(ON).splitlines() if line.startswith("| [step]"))
+    (row,) = (line for line in table.splitlines() if line.startswith("| [step]"))
     said = dict(zip(capabilities_page.COLUMNS, row.strip("| ").split(" | ")[1:], strict=True))
     assert said["set_points"] == "needed"
     assert said["settings.law"] == said["mark"] == "used"

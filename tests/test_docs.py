@@ -50,8 +50,9 @@ COPIED = ("bench", "drivers", "procedures", "reports", "sim_backend", "rigs", "s
 
 
 LONG = (
-    "add-a-device", "adopt-a-calibration", "amb-calibration", "angle-step", "axis-breakaway", "balance", "bearing-model",
-    "change-a-plan", "coast-down", "compare", "compensation", "connect-a-rig", "first-calibration", "force-constant",
+    "actuator-constant", "add-a-device", "adopt-a-calibration", "amb-calibration", "angle-step", "axis-breakaway", "balance",
+    "bearing-constant", "bearing-model", "change-a-plan", "coast-down", "coil-map", "compare", "compensation", "connect-a-rig",
+    "current-step", "first-calibration", "force-constant",
     "force-coupling", "force-map", "inject-faults", "lift-off", "maximum-speed", "model", "negative-stiffness",
     "run-a-campaign", "run-up", "sensitivity", "slew", "spindown", "step", "torque-constant", "tracking", "trend", "unbalance",
     "use-in-ci", "watch-a-run",

@@ -14,9 +14,12 @@ ROOT = Path(__file__).parent.parent
 
 
 def test_every_part_names_something() -> None:
-    assert groups.REAL_TIME in groups.GROUPS
+    assert {groups.REAL_TIME, groups.PATIENT} <= {*groups.GROUPS}
     parts = [part for parts in groups.GROUPS.values() for part in parts]
-    for part in (*parts, *(name for name in groups.FIRST if name != groups.REAL_TIME)):
+    for name in groups.COMPUTED:
+        file, _, test = name.partition("::")
+        assert f"def {test}" in (ROOT / file).read_text(encoding="utf-8"), name
+    for part in (*parts, *(name for name in groups.FIRST if name not in groups.GROUPS)):
         file, _, page = part.partition("::test_commands_work")
         if page:
             assert list((ROOT / "docs").rglob(f"{page.strip('[]')}.md")), part
@@ -29,6 +32,13 @@ def test_every_part_names_something() -> None:
     [
         ("tests/firmware/test_line_drivers.py::test_x", "real-time"),
         ("tests/links/test_killed.py::test_a_killed_rig_is_noticed", "real-time"),
+        ("tests/links/test_chain.py::test_equal_results[slcan:socket]", "patient"),
+        ("tests/links/test_own_controller.py::test_x[1]", "tests/links/test_own_controller.py"),
+        ("tests/links/test_protection_trips.py::test_each_protected_reading_of_the_served_rig_trips[a]", "real-time"),
+        (
+            "tests/links/test_protection_trips.py::test_each_protected_reading_trips_and_the_machine_is_safe[a]",
+            "tests/links/test_protection_trips.py",
+        ),
         ("tests/drivers/test_heartbeat_alone.py::test_x[1]", "real-time"),
         ("tests/test_docs.py::test_commands_work[connect-a-rig]", "real-time"),
         ("tests/test_docs.py::test_commands_work[force-coupling]", "chained pages"),
@@ -70,12 +80,15 @@ def test_what_keeps_up_with_wall_time_goes_first_and_is_not_given_less_of_the_pr
     base = os.nice(0)
     yields = max(base, groups.NICE)
     test = "import os, pytest\n@pytest.mark.parametrize('k', range({}))\ndef test_{}(k): assert os.nice(0) == {}\n"
-    for name, count, nice in (("firmware", 4, base), ("links", 3, base), ("sim", 40, yields), ("wire", 30, yields)):
-        (tmp_path / "tests" / name).mkdir(parents=True)
-        (tmp_path / "tests" / name / f"test_{name}.py").write_text(test.format(count, name, nice))
+    files = (("firmware/test_a", 4, base), ("links/test_b", 3, base), ("links/test_chain", 2, base),
+             ("sim/test_c", 40, yields), ("wire/test_d", 30, yields))  # fmt: skip
+    for name, count, nice in files:
+        path = tmp_path / "tests" / f"{name}.py"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(test.format(count, path.stem, nice))
     done = subprocess.run(
         [sys.executable, "-m", "pytest", "-q", "-n", "2", "--dist", "loadgroup", "-p", "no:cacheprovider",
          "-p", "no:hypothesispytest"], cwd=tmp_path, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout
-    assert "77 passed" in done.stdout
+    assert "79 passed" in done.stdout

@@ -108,19 +108,19 @@ def listening(folder: Path, url: str) -> Callable[[], list[tuple[float, float]]]
     ("rig_name", "procedure", "plan"),
     [("lira-200v", "current-step", ("repeats=4", "small_repeats=4")),
      ("lira", "mission", ("repeats=2", "spare_s=0.5")),
-     ("lira", "loop-response", ("axes=['z', 'gamma']",)),
+     ("lira", "loop-response", ("axes=['z', 'gamma']", "lines=5", "refined=5")),
      ("lira", "coil-map", ("repeats=2",)),
      ("lira", "encoder-zero", ("motors=['LA']", "repeats=3", "trial_rad=0")),
      ("lira", "unstable-pole", ("shots=20",)),
      ("lira", "sensor-delay", ("lines=3", "record_s=0.3")),
      ("lira", "gate-margin", ("places_m=[0.008]", "angles_rad=[-1.5, 1.5]")),
-     ("lira", "pull-ratio", ("levels_m=[-2e-5, 0.0, 2e-5]", "settle_s=1")),  # by the host's clock: the rig may be behind
-     ("lira", "actuator-constant", ('loops="along"',))],
+     ("lira", "pull-ratio", ("levels_m=[-2e-5, 0.0, 2e-5]", "settle_s=0.6")),  # by the host's clock: the rig may be behind
+     ("lira", "actuator-constant", ('loops="along"', "lines=5", "pairs=3"))],
 )  # fmt: skip
 def test_procedures_over_the_command_line(tmp_path: Path, rig_name: str, procedure: str, plan: tuple[str, ...]) -> None:
     """Each against a served rig, as processes: what is measured holds what the machine was drawn with."""
     arguments = tuple(x for one in plan for x in ("--plan", one))
-    reduced = int(procedure in ("gate-margin", "sensor-delay"))  # which no current loop matters to
+    reduced = int(procedure in ("gate-margin", "pull-ratio", "sensor-delay"))  # which no current loop matters to
     with processes.served(tmp_path, "--seed", "3", "--truth", f"reduced={reduced}", rig=rig_name, ports=PORTS) as rig:
         with processes.real_bench(
             tmp_path, "run", procedure, "--rig", rig_name, "--backend", "live", "--operator", "auto", "--no-report",

@@ -20,7 +20,7 @@ pytestmark = [pytest.mark.long, pytest.mark.timeout(120)]
 
 
 def listened(capsys: pytest.CaptureFixture[str], rig: str, url: str, *arguments: str) -> list[str]:
-    assert main(("listen", rig, "--link", f"controller={url}", "--seconds", "4", *arguments)) == 0
+    assert main(("listen", rig, "--link", f"controller={url}", "--seconds", "2", *arguments)) == 0
     return capsys.readouterr().out.splitlines()
 
 

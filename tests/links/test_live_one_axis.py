@@ -10,7 +10,7 @@ import pytest
 
 RIG = "amb1dof"
 PORTS = ("--link", "controller=slcan:socket://127.0.0.1:0", "--link", "operator=line:127.0.0.1:0")
-COMPARE = ("repeats=3", "calm_s=1.5")
+COMPARE = ("repeats=3", "calm_s=1.0", 'loaded=["overlapping", "observer"]')
 DERIVE = ("lines_hz=[16.3, 53.3]", "record_s=1.5", "settle_s=1.0")
 
 

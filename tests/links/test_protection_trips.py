@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from bench.cli.__main__ import main
 from bench.cli.virtual import Knobs, flown
 from bench.errors import InterlockError
 from bench.recording import Recording
-from bench.rigfile import load_rig, protection
+from bench.rigfile import RigFile, load_rig, protection
 from bench.rigfile.protection import Protected
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -27,16 +28,22 @@ BEYOND = 0.02  # of a limit
 PATIENCE_S = 3.0  # of a watchdog: a test machine that gives its processes no time for so long is no dead host
 
 
+@cache
+def loaded(path: Path) -> RigFile:
+    """Once for all the cases, which are made whenever tests are collected."""
+    return load_rig(str(path))
+
+
 def beyond(path: Path, p: Protected) -> float:
     """A value beyond a limit that a channel's signal can say: the end where there is room for one."""
-    low, high = held(load_rig(str(path)), p.name) if " " not in p.name else (-math.inf, math.inf)
+    low, high = held(loaded(path), p.name) if " " not in p.name else (-math.inf, math.inf)
     ends = [limit + sign * BEYOND * abs(limit) for limit, sign in ((p.high, 1), (p.low, -1)) if math.isfinite(limit)]
     return next(x for x in ends if low < x < high)
 
 
 def each() -> Iterator[Any]:
     for path in RIGS:
-        for p in protection.all_of(load_rig(str(path))):
+        for p in protection.all_of(loaded(path)):
             yield pytest.param(path, p.name, beyond(path, p), id=f"{path.stem}-{p.name}")
 
 
@@ -47,7 +54,7 @@ def each_served() -> Iterator[Any]:
     """One reading of each message and limit is served in CI; the bytes of every reading are the same in one process."""
     known = set()
     for path in RIGS:
-        rig = load_rig(str(path))
+        rig = loaded(path)
         for p in protection.all_of(rig):
             source = (
                 rig.channels[p.name].signal.partition(".")[0] if p.name in rig.channels else p.name.partition(" ")[0]

@@ -64,6 +64,12 @@ def known(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Calibration]:
     return facts_of("tsbs12-drag", 2026, tmp_path_factory.mktemp("facts"))
 
 
+@pytest.fixture(scope="module")
+def first(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Calibration]:
+    """Of the rig as it ships."""
+    return facts_of("tsbs12", 1, tmp_path_factory.mktemp("first"))
+
+
 def test_a_sound_rig_is_recovered_within_its_intervals(tmp_path: Path, known: dict[str, Calibration]) -> None:
     done = run(tmp_path, "tsbs12-drag", 2026, known)
     found, true = results(done), truth_of_motion(done)
@@ -108,29 +114,30 @@ def test_the_nominal_rig_shows_what_the_thesis_prints(tmp_path: Path) -> None:
     assert serious(done) == {}
 
 
-def test_a_plan_that_would_trip_is_refused_by_the_facts(tmp_path: Path) -> None:
+def test_a_plan_that_would_trip_is_refused_by_the_facts(tmp_path: Path, first: dict[str, Calibration]) -> None:
     """10 A beside i_y 4.01 A and some 0.2 A of i_x leave 7.89 A: times 2.8 N m/A over 0.059 N m s/rad are 378 rad/s, where
     the machine trips at 80."""
-    facts = facts_of("tsbs12", 1, tmp_path)
-    b, torque = facts["spindown"].values["B"].value, facts["torque-constant"].values
+    b, torque = first["spindown"].values["B"].value, first["torque-constant"].values
     with pytest.raises(ConfigError, match="nothing was started") as refused:
-        run(tmp_path, "tsbs12", 1, facts, limit_A=10.0, carried_A=0.0, bias_A=3.0)
+        run(tmp_path, "tsbs12", 1, first, limit_A=10.0, carried_A=0.0, bias_A=3.0)
     said = re.search(r"turn the rotor at (\d+) rad/s \(\d+ r/min\); the guard is 70 rad/s", str(refused.value))
     assert said is not None
     speed = (10 - (48.55 / 12.1 + 0.2) / 2) * torque["alpha_tau"].value * math.cos(8 * torque["gamma_0t"].value) / b
     assert float(said.group(1)) == pytest.approx(speed, rel=5e-3)  # T_c takes 0.2 %
     assert not (tmp_path / "recording.mcap").exists()
     rig = load_rig("tsbs12")
-    assert list(foresees(rig, Plan(**RAISED), facts)) == []
-    (slow,) = foresees(rig, Plan(**{**RAISED, "carried_A": 2.7}), facts)
+    assert list(foresees(rig, Plan(**RAISED), first)) == []
+    (slow,) = foresees(rig, Plan(**{**RAISED, "carried_A": 2.7}), first)
     assert "lambda 1/2" in slow
 
 
-def test_a_drawn_machine_that_the_plan_is_none_for_is_counted_apart(tmp_path: Path) -> None:
+def test_a_drawn_machine_that_the_plan_is_none_for_is_counted_apart(
+    tmp_path: Path, first: dict[str, Calibration]
+) -> None:
     """Its own facts say so: no value is missing, and the rig stands among those that cannot do the run."""
     task = RigTask("tsbs12", load_rig("tsbs12").digest, (), {}, "none", str(tmp_path))
     step = StepTask("maximum-speed", {"limit_A": 5.0, "carried_A": 0.0, "bias_A": 3.0}, (), False)
-    done = simulated_step(task, step, 1, tmp_path / "recording.mcap", facts_of("tsbs12", 1, tmp_path))
+    done = simulated_step(task, step, 1, tmp_path / "recording.mcap", first)
     assert "turn the rotor at" in done.cannot
     assert list(done.results) == []
 
