@@ -7,7 +7,9 @@ import json
 import sqlite3
 import sys
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
+from itertools import repeat
 from json.encoder import encode_basestring
 from pathlib import Path
 from typing import Any
@@ -81,11 +83,12 @@ def _told(request: RunsRequest) -> int:
         shown = _shown(request, found)
     except (sqlite3.Error, OSError) as error:
         raise BenchError(f"{out / index.NAME}: the index cannot be used: {error}") from error
-    if request.as_json:
-        sys.stdout.writelines(_as_json(found, kinds, out, shown))
-    else:
-        width = columns() if sys.stdout.isatty() else None
-        sys.stdout.writelines(_lines(found, kinds, out, shown, width))
+    with suppress(BrokenPipeError):  # whoever reads has seen enough, as `head` has
+        if request.as_json:
+            sys.stdout.writelines(_as_json(found, kinds, out, shown))
+        else:
+            width = columns() if sys.stdout.isatty() else None
+            sys.stdout.writelines(_lines(found, kinds, out, shown, width))
     return len(found)
 
 
@@ -118,7 +121,7 @@ def _lines(found: Listed, kinds: Mapping[int, Kind], out: Path, shown: Shown, wi
     Very many runs are of few kinds: what is the same in all runs of one is put together once."""
     of = {n: kinds[n] for n in {run[2] for run in found}}
     ends = {n: [kind.rig, which_machine(kind.served, kind.seed, kind.visit)] for n, kind in of.items()}
-    cells = [[texts.get(number, "") for _, number, *_ in found] for texts in shown.values()]
+    cells = [[*map(texts.get, [run[1] for run in found], repeat("-"))] for texts in shown.values()]
     outcomes = max((len(kind.outcome) for kind in of.values()), default=0)
     sizes = [max(len(name), *map(len, column), 1) for name, column in zip(shown, cells, strict=True)]
     tails = [max((len(end[k]) for end in ends.values()), default=0) for k in (0, 1)]
@@ -139,15 +142,15 @@ def _lines(found: Listed, kinds: Mapping[int, Kind], out: Path, shown: Shown, wi
     }
     if not shown or below:
         whole = {n: f"{start[n]} {end[n]}" for n in of}
-        for k, (run_id, _, kind) in enumerate(found):
+        for run_id, number, kind in found:
             yield f"{whole[kind]}{run_id}\n"
             if below:
-                yield from (f"  {name} {column[k]}\n" for name, column in zip(shown, cells, strict=True) if column[k])
+                yield from (f"  {name} {texts[number]}\n" for name, texts in shown.items() if number in texts)
         return
     yield " ".join([" " * outcomes, *(name.ljust(n) for name, n in zip(shown, sizes, strict=True))]).rstrip() + "\n"
-    padded = ([(text or "-").ljust(n) for text in column] for column, n in zip(cells, sizes, strict=True))
-    for (run_id, _, kind), *values in zip(found, *padded, strict=True):
-        yield f"{start[kind]} {' '.join(values)} {end[kind]}{run_id}\n"
+    padded = ([text.ljust(n) for text in column] for column, n in zip(cells, sizes, strict=True))
+    for (run_id, _, kind), values in zip(found, map(" ".join, zip(*padded, strict=True)), strict=True):
+        yield f"{start[kind]} {values} {end[kind]}{run_id}\n"
 
 
 def which_machine(served: bool, seed: int | None, visit: int | None) -> str:
@@ -161,11 +164,11 @@ def _as_json(found: Listed, kinds: Mapping[int, Kind], out: Path, shown: Shown) 
     """A line for each run. Of very many what is the same in all of a kind is encoded once."""
     own = {n: _encoded(_kind_as_data(kind))[1:-1] for n, kind in kinds.items()}
     folder = encode_basestring(f"{out}/")[:-1]
-    columns = [(encode_basestring(name), texts) for name, texts in shown.items()]
+    named = [(f"{encode_basestring(name)}: ", texts) for name, texts in shown.items()]
     before = "[\n"
     for run_id, number, kind, started, ended in found:
         name, end = encode_basestring(run_id), "null" if ended is None else encode_basestring(ended)
-        results = ", ".join([f"{name}: {texts[number]}" for name, texts in columns if number in texts])
+        results = ", ".join([name + texts[number] for name, texts in named if number in texts]) if named else ""
         yield (f'{before}{{"run_id": {name}, {own[kind]}, "started": {encode_basestring(started)}, "ended": {end}, '
                f'"path": {folder}{name[1:]}, "results": {{{results}}}}}')  # fmt: skip
         before = ",\n"
