@@ -80,14 +80,14 @@ def kinds(root: Path) -> list[Kind]:
     return _read(root, lambda db, there: list(_kinds(db, "WHERE kind IN (SELECT kind FROM runs)").values()))
 
 
-def _kinds(db: sqlite3.Connection, where: str = "", values: tuple[str, ...] = ()) -> dict[int, Kind]:
+def _kinds(db: sqlite3.Connection, where: str = "", values: tuple[str | int, ...] = ()) -> dict[int, Kind]:
     found = db.execute(f"SELECT kind, {KIND} FROM kinds {where}", values)
     return {number: Kind._make(kind) for number, *kind in found}
 
 
 def results(
     root: Path, *, quantity: str | None = None, procedure: str | None = None, rig: str | None = None, failed: bool = False,
-    last: int | None = None, of: Sequence[str] | None = None, machine: MachineKind | None = None,
+    last: int | None = None, of: Sequence[str] | None = None, machine: MachineKind | None = None, seed: int | None = None,
 ) -> list[Result]:  # fmt: skip
     """Results of the runs in `root`, oldest run first, in the record's order within a run; those deleted since left out.
 
@@ -96,10 +96,11 @@ def results(
             all that is measured of it, where nothing has that very name.
         last: the newest so many runs that have any.
         of: the names of some runs: of these alone.
+        seed: of this virtual machine alone.
     """
     if not root.is_dir():
         return []
-    where, values = _chosen(procedure, rig, failed, machine, of)
+    where, values = _chosen(procedure, rig, failed, machine, of, seed)
     # The newest few are found by going back through the runs, all of a series where they lie together.
     tables = "runs r CROSS JOIN results s ON s.run = r.run" if last or of else "results s JOIN runs r USING (run)"
     tables += " JOIN kinds USING (kind) JOIN names n ON n.number = s.number JOIN made_with USING (made)"
@@ -182,10 +183,11 @@ def _named(db: sqlite3.Connection, quantity: str) -> str:
 
 
 def _chosen(
-    procedure: str | None, rig: str | None, failed: bool, machine: MachineKind | None, of: Sequence[str] | None = None
-) -> tuple[str, tuple[str, ...]]:
+    procedure: str | None, rig: str | None, failed: bool, machine: MachineKind | None, of: Sequence[str] | None = None,
+    seed: int | None = None,
+) -> tuple[str, tuple[str | int, ...]]:  # fmt: skip
     """The condition of a query for runs, with its values."""
-    asked = {"procedure = ?": procedure, "rig = ?": rig}
+    asked: dict[str, str | int | None] = {"procedure = ?": procedure, "rig = ?": rig, "seed = ?": seed}
     conditions = [text for text, value in asked.items() if value is not None]
     values = tuple(v for v in asked.values() if v is not None)
     conditions += [f"outcome NOT IN {SOUND}"] if failed else []
@@ -197,7 +199,7 @@ def _chosen(
 
 
 def _there(
-    db: sqlite3.Connection, query: str, values: tuple[str, ...], last: int | None, there: set[str] | None
+    db: sqlite3.Connection, query: str, values: tuple[str | int, ...], last: int | None, there: set[str] | None
 ) -> list[tuple[Any, ...]]:
     """Rows of runs that are still there, oldest first; of so many runs at most. `query` has `{0}` for the order; `there` are
     the names in the folder, where the index has others."""

@@ -59,6 +59,12 @@ def test_the_twin_is_followed_where_it_is_asked_for(mixed: Path, capsys: pytest.
     assert trend_of(capsys, mixed, "--machine", "served")[0] == [76.0, 76.1, 76.2, 76.3]
     assert trend_of(capsys, mixed, "--machine", "simulated", "--seed", "4")[0] == [78.0, 78.1, 78.2, 78.3]
     assert trend_of(capsys, mixed, "--seed", "3")[0] == [77.0, 77.1, 77.2, 77.3]
+    assert trend_of(capsys, mixed, "--seed", "3", "--last", "2")[0] == [77.2, 77.3]
+    assert (
+        "older ones are neither shown"
+        in told(capsys, "trend", "K_i", "--out", str(mixed), "--seed", "3", "--last", "2")[1]
+    )
+    assert "older" not in told(capsys, "trend", "K_i", "--out", str(mixed), "--seed", "3", "--last", "4")[1]
 
 
 def test_what_is_several_machines_is_refused_by_what_tells_them_apart(
