@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import secrets
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -95,6 +94,8 @@ def create_analysis(run: RunDirectory, started: datetime) -> Path:
 
 
 def _exclusive(parent: Path, stem: str) -> Path:
+    import secrets  # with what it needs of cryptography 5 ms: whoever only reads runs has no use for it
+
     for _ in range(64):
         path = parent / f"{stem}-{secrets.token_hex(2)}"
         try:

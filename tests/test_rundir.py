@@ -23,7 +23,7 @@ def test_the_name_is_procedure_utc_and_four_hex_digits(tmp_path: Path) -> None:
 
 def test_a_taken_name_is_never_used_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     names = iter(["aaaa", "aaaa", "bbbb"])
-    monkeypatch.setattr(rundir.secrets, "token_hex", lambda _: next(names))
+    monkeypatch.setattr("secrets.token_hex", lambda _: next(names))
     first = rundir.create(tmp_path, "p", AT)
     (first.path / "record.json").write_text("precious")
     second = rundir.create(tmp_path, "p", AT)

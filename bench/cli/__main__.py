@@ -1,4 +1,4 @@
-"""The command `bench`: what can be typed. `bench.cli.status` says what exit status it ends with.
+"""The command `bench`: what can be typed. `bench.cli.dispatch` reads it, `bench.cli.status` says what exit status it ends with.
 
 Only the declarations live here; each command imports its module when it is used, so that `--help` and `list` are fast.
 """
@@ -14,7 +14,7 @@ import typer
 
 from bench.cli import options as o
 from bench.cli import stored, threads
-from bench.cli.status import run_app
+from bench.cli.dispatch import run_app
 
 app = typer.Typer(
     help="Test and calibrate magnetically levitated machines, real or simulated.",

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 from bench.cli.loading import load_procedure
-from bench.cli.told import unit_text
 from bench.display_units import of_result
 from bench.errors import AnalysisError, BenchError
 from bench.findings import SIMULATED_CONTROLLER
@@ -23,6 +22,7 @@ from bench.history.naming import pair_named
 from bench.progress_text import columns
 from bench.quantity import Measured
 from bench.record.records import Measurement, Record, read_record
+from bench.record.told import unit_text
 from bench.recording import Recording
 from bench.run.evaluation import yielded
 from bench.run.indexrow import MachineKind, machine_kind

@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from bench import display_units
-from bench.cli.told import unit_text, with_unit
 from bench.record.limits import Verdict
 from bench.record.records import LimitEntry, Measurement, Record
+from bench.record.told import unit_text, with_unit
 from bench.uncertainty import stated
 from reports.vectors import COS, SIN, Vector, vectors
 

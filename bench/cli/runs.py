@@ -6,8 +6,10 @@ import difflib
 import json
 import sqlite3
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
+from itertools import repeat
 from json.encoder import encode_basestring
 from pathlib import Path
 from typing import Any
@@ -15,12 +17,12 @@ from typing import Any
 from bench.errors import BenchError, ConfigError
 from bench.progress_text import columns
 from bench.run import index
-from bench.run.indexrow import Kind, MachineKind, Numbers, Result
+from bench.run.indexrow import Kind, MachineKind
 
-Shown = dict[str, dict[str, Result | Numbers]]
-"""Results by name and run."""
+Shown = dict[str, dict[int, str]]
+"""Results by name and number of the run, as they are printed."""
 Listed = list[tuple[Any, ...]]
-"""Of each run its name, the number of its kind and, for JSON, when it began and ended."""
+"""Of each run its name, its number, that of its kind and, for JSON, when it began and ended."""
 FEW = 1000  # runs whose results are looked for one by one
 
 
@@ -58,10 +60,10 @@ def runs_command(request: RunsRequest) -> int:
 
 def _none_such(request: RunsRequest) -> str:
     """Of what that is asked for there is none, and what there is."""
-    told = []
+    told, kinds = [], index.kinds(request.out)
     for asked, known in (
-        (request.procedure, {e.procedure for e in index.entries(request.out)}),
-        (request.rig, {e.rig for e in index.entries(request.out)}),
+        (request.procedure, {kind.procedure for kind in kinds}),
+        (request.rig, {kind.rig for kind in kinds}),
     ):
         if asked is not None and known and asked not in known:
             near = difflib.get_close_matches(asked, known, 1)
@@ -81,11 +83,12 @@ def _told(request: RunsRequest) -> int:
         shown = _shown(request, found)
     except (sqlite3.Error, OSError) as error:
         raise BenchError(f"{out / index.NAME}: the index cannot be used: {error}") from error
-    if request.as_json:
-        sys.stdout.write(_as_json(found, kinds, out, shown))
-    else:
-        width = columns() if sys.stdout.isatty() else None
-        sys.stdout.write("".join(_lines(found, kinds, out, shown, width)))
+    with suppress(BrokenPipeError):  # whoever reads has seen enough, as `head` has
+        if request.as_json:
+            sys.stdout.writelines(_as_json(found, kinds, out, shown))
+        else:
+            width = columns() if sys.stdout.isatty() else None
+            sys.stdout.writelines(_lines(found, kinds, out, shown, width))
     return len(found)
 
 
@@ -96,10 +99,9 @@ def _shown(request: RunsRequest, found: Listed) -> Shown:
         ConfigError: no run has measured it.
     """
     out: Shown = {}
-    few = [run[0] for run in found] if len(found) <= FEW else None
+    few = [run[1] for run in found] if len(found) <= FEW else None
     for word in request.show:
-        results: Sequence[Result | Numbers]
-        results = index.numbers(request.out, word) if few is None else index.results(request.out, quantity=word, of=few)
+        results = index.shown(request.out, word, as_json=request.as_json, runs=few)
         if not results and not index.results(request.out, quantity=word, last=1):
             known = index.names(request.out)
             near = difflib.get_close_matches(word, known, 3) or known[:8]
@@ -107,8 +109,8 @@ def _shown(request: RunsRequest, found: Listed) -> Shown:
                 f"--show {word}: found no run in {request.out} that has measured it; expected a quantity of a record, such as "
                 f"{', '.join(near) or 'K_i'}"
             )
-        for result in results:
-            out.setdefault(result.name, {})[result.run_id] = result
+        for name, texts in results.items():
+            out.setdefault(name, {}).update(texts)
     return out
 
 
@@ -117,12 +119,11 @@ def _lines(found: Listed, kinds: Mapping[int, Kind], out: Path, shown: Shown, wi
     the directory goes by its name, then which rig it was is left out, and at last what is shown gets a line of its own.
 
     Very many runs are of few kinds: what is the same in all runs of one is put together once."""
-    of = {n: kinds[n] for n in {run[1] for run in found}}
+    of = {n: kinds[n] for n in {run[2] for run in found}}
     ends = {n: [kind.rig, which_machine(kind.served, kind.seed, kind.visit)] for n, kind in of.items()}
-    here = {run[0] for run in found} if shown else set()
-    values = [{run: _value(r) for run, r in by_run.items() if run in here} for by_run in shown.values()]
+    cells = [[*map(texts.get, [run[1] for run in found], repeat("-"))] for texts in shown.values()]
     outcomes = max((len(kind.outcome) for kind in of.values()), default=0)
-    sizes = [max(len(name), *map(len, column.values()), 1) for name, column in zip(shown, values, strict=True)]
+    sizes = [max(len(name), *map(len, column), 1) for name, column in zip(shown, cells, strict=True)]
     tails = [max((len(end[k]) for end in ends.values()), default=0) for k in (0, 1)]
     longest = max((len(run[0]) for run in found), default=0)
     folder = f"{out}/"
@@ -141,15 +142,15 @@ def _lines(found: Listed, kinds: Mapping[int, Kind], out: Path, shown: Shown, wi
     }
     if not shown or below:
         whole = {n: f"{start[n]} {end[n]}" for n in of}
-        for run in found:
-            yield f"{whole[run[1]]}{run[0]}\n"
+        for run_id, number, kind in found:
+            yield f"{whole[kind]}{run_id}\n"
             if below:
-                yield from (f"  {name} {v[run[0]]}\n" for name, v in zip(shown, values, strict=True) if run[0] in v)
+                yield from (f"  {name} {texts[number]}\n" for name, texts in shown.items() if number in texts)
         return
     yield " ".join([" " * outcomes, *(name.ljust(n) for name, n in zip(shown, sizes, strict=True))]).rstrip() + "\n"
-    for run in found:
-        cells = " ".join(v.get(run[0], "-").ljust(n) for v, n in zip(values, sizes, strict=True))
-        yield f"{start[run[1]]} {cells} {end[run[1]]}{run[0]}\n"
+    padded = ([text.ljust(n) for text in column] for column, n in zip(cells, sizes, strict=True))
+    for (run_id, _, kind), values in zip(found, map(" ".join, zip(*padded, strict=True)), strict=True):
+        yield f"{start[kind]} {values} {end[kind]}{run_id}\n"
 
 
 def which_machine(served: bool, seed: int | None, visit: int | None) -> str:
@@ -159,25 +160,19 @@ def which_machine(served: bool, seed: int | None, visit: int | None) -> str:
     return "" if seed is None else f"seed {seed}, visit {visit}" if visit else f"seed {seed}"
 
 
-def _value(r: Result | Numbers) -> str:
-    from bench.cli.told import with_unit
-
-    return "missing" if r.value is None or r.U is None else with_unit(r.value, r.U, r.unit)
-
-
-def _as_json(found: Listed, kinds: Mapping[int, Kind], out: Path, shown: Shown) -> str:
+def _as_json(found: Listed, kinds: Mapping[int, Kind], out: Path, shown: Shown) -> Iterator[str]:
     """A line for each run. Of very many what is the same in all of a kind is encoded once."""
     own = {n: _encoded(_kind_as_data(kind))[1:-1] for n, kind in kinds.items()}
     folder = encode_basestring(f"{out}/")[:-1]
-    lines = []
-    for run_id, kind, started, ended in found:
+    named = [(f"{encode_basestring(name)}: ", texts) for name, texts in shown.items()]
+    before = "[\n"
+    for run_id, number, kind, started, ended in found:
         name, end = encode_basestring(run_id), "null" if ended is None else encode_basestring(ended)
-        results = (
-            {n: _result_as_data(by_run[run_id]) for n, by_run in shown.items() if run_id in by_run} if shown else {}
-        )
-        lines.append(f'{{"run_id": {name}, {own[kind]}, "started": {encode_basestring(started)}, "ended": {end}, '
-                     f'"path": {folder}{name[1:]}, "results": {_encoded(results) if results else "{}"}}}')  # fmt: skip
-    return "[\n" + ",\n".join(lines) + "\n]\n"
+        results = ", ".join([name + texts[number] for name, texts in named if number in texts]) if named else ""
+        yield (f'{before}{{"run_id": {name}, {own[kind]}, "started": {encode_basestring(started)}, "ended": {end}, '
+               f'"path": {folder}{name[1:]}, "results": {{{results}}}}}')  # fmt: skip
+        before = ",\n"
+    yield "\n]\n" if found else "[\n\n]\n"
 
 
 def _encoded(data: Mapping[str, Any]) -> str:
@@ -186,10 +181,3 @@ def _encoded(data: Mapping[str, Any]) -> str:
 
 def _kind_as_data(kind: Kind) -> dict[str, Any]:
     return {**kind._asdict(), "served": bool(kind.served), "machine": kind.machine}
-
-
-def _result_as_data(r: Result | Numbers) -> dict[str, Any]:
-    return {
-        "value": r.value, "unit": r.unit, "standard_uncertainty": r.u, "expanded_uncertainty": r.U, "dof": r.dof,
-        "coverage_probability": r.p, "low": r.lower, "high": r.upper, "verdict": r.verdict,
-    }  # fmt: skip

@@ -16,6 +16,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
             from bench.cli.completing import complete
 
             return complete(given[1:])
+        if given[:1] in (["runs"], ["trend"]):
+            from bench.cli.plain import plain
+
+            if (act := plain(given)) is not None:
+                from bench.cli.status import ended
+
+                return ended(act)
         from bench.cli.__main__ import main as run
 
         return run(arguments)

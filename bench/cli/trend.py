@@ -69,13 +69,10 @@ def found_trend(asked: TrendRequest) -> tuple[Trend, bool]:
                           f"them. Next: leave --machine out")  # fmt: skip
     try:
         machine, twins = _followed(asked)
-        # Of a virtual machine all runs are read: the index does not choose by seed.
-        most = asked.last + 1 if asked.seed is None else None
         results = index.results(
-            asked.out, quantity=asked.quantity, procedure=asked.procedure, rig=asked.rig, last=most, machine=machine
+            asked.out, quantity=asked.quantity, procedure=asked.procedure, rig=asked.rig, last=asked.last + 1, machine=machine,
+            seed=asked.seed,
         )  # fmt: skip
-        if asked.seed is not None:
-            results = [r for r in results if r.seed == asked.seed]
         runs = list(dict.fromkeys(r.run_id for r in results))
         kept = set(runs[-asked.last :])
         history = one_history([r for r in results if r.run_id in kept], asked.quantity, lambda: index.names(asked.out),

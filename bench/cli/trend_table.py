@@ -44,7 +44,7 @@ def parts(trend: Trend, older: bool) -> Iterator[tuple[str, str]]:
         yield "segment", _change(segment, step, k, t) if many else ""
         yield "rows", "\n".join(_rows(segment, t))
         yield from (("note", said) for said in _said(segment, t, trend.weight))
-    used = {mark for segment in trend.segments for k in range(len(segment.results)) for mark in _marks(segment, k)}
+    used = {mark for segment in trend.segments for marks in _marks(segment) for mark in marks}
     if used:
         yield "marks", "marks: " + ", ".join(f"{m} {said}" for m, said in MARKS.items() if m in used)
 
@@ -76,21 +76,21 @@ def _change(s: Segment, step: Step | None, position: int, t: Told) -> str:
 def _rows(s: Segment, t: Told) -> Iterator[str]:
     unit = f", {t.unit}" if t.unit else ""
     yield _row("no", "visit" if t.axis == "visit" else "date, UTC", f"value{unit}", "U", "EWMA", _heading(s), "")
-    for k in range(len(s.results)):
+    for k, marks in enumerate(_marks(s)):
         if s.chart is not None and k == s.chart.baseline:
             yield _row("", "", "", "", "", f"{'-' * STRIP}", "")
-        yield _line(s, k, t)
+        yield _line(s, k, t, marks)
 
 
 def _row(number: str, when: str, value: str, u: str, ewma: str, strip: str, marks: str) -> str:
     return f"{number:>3} {when:<16} {value:>11} {u:>9} {ewma:>9} {strip:<{STRIP}} {marks}".rstrip()
 
 
-def _line(s: Segment, k: int, t: Told) -> str:
+def _line(s: Segment, k: int, t: Told, marks: str) -> str:
     averaged = None if s.chart is None or k < s.chart.baseline else float(s.chart.ewma[k - s.chart.baseline])
     when = t.when(float(s.times[k])).removeprefix("visit ")
     value, u, ewma = (_fitting(x, t, n) for x, n in ((s.results[k].value, 11), (s.results[k].U, 9), (averaged, 9)))
-    return _row(str(k + 1), when, value, u, ewma, _strip(s, float(s.values[k]), averaged), "".join(_marks(s, k)))
+    return _row(str(k + 1), when, value, u, ewma, _strip(s, float(s.values[k]), averaged), marks)
 
 
 def _fitting(x: float | None, t: Told, width: int) -> str:
@@ -99,11 +99,11 @@ def _fitting(x: float | None, t: Told, width: int) -> str:
     return number if x is None or len(number) <= width else f"{x / t.one / 10.0**t.power:.2g}"
 
 
-def _marks(s: Segment, k: int) -> list[str]:
-    wide = s.wide[k] and not all(s.wide)
-    found = {"x": s.beyond[k], "e": s.ewma_beyond[k], "w": wide, "d": s.overdue[k], "F": s.results[k].outcome == "FAIL",
-             "?": s.results[k].outcome == "INDETERMINATE"}  # fmt: skip
-    return [mark for mark, said in found.items() if said]
+def _marks(s: Segment) -> list[str]:
+    """Of each run what marks it."""
+    told = {"x": s.beyond, "e": s.ewma_beyond, "w": [] if all(s.wide) else s.wide, "d": s.overdue,
+            "F": [r.outcome == "FAIL" for r in s.results], "?": [r.outcome == "INDETERMINATE" for r in s.results]}  # fmt: skip
+    return ["".join(mark for mark, said in told.items() if said and said[k]) for k in range(len(s.results))]
 
 
 def _heading(s: Segment) -> str:

@@ -4,21 +4,20 @@ rebuilt. What only reads it imports nothing heavy: `bench.run.indexed` reads the
 from __future__ import annotations
 
 import json
-import os
 import sqlite3
 from collections import Counter
 from collections.abc import Callable, Sequence
-from itertools import groupby
+from itertools import groupby, islice
 from operator import itemgetter
 from pathlib import Path
 from typing import Any, TypeVar
 
-from bench.run.indexrow import KIND, RUN_COLUMNS, IndexEntry, Kind, MachineKind, Numbers, Result
+from bench.run.indexrow import KIND, NUMBERS, RUN_COLUMNS, IndexEntry, Kind, MachineKind, Result
 from bench.run.indexstore import NAME, VERSION, answered, put, rebuild, take_in, uncollected
 from bench.rundir import RunDirectory
 
-__all__ = ["NAME", "SOUND", "VERSION", "IndexEntry", "MachineKind", "Result", "add", "entries", "listing", "machines", "names",
-           "numbers", "rebuild", "results", "uncollected"]  # fmt: skip
+__all__ = ["NAME", "SOUND", "VERSION", "IndexEntry", "MachineKind", "Result", "add", "entries", "kinds", "listing", "machines",
+           "names", "rebuild", "results", "shown", "uncollected"]  # fmt: skip
 SOUND = ("PASS", "DONE")
 T = TypeVar("T")
 OF_MACHINE: dict[MachineKind, str] = {
@@ -26,9 +25,9 @@ OF_MACHINE: dict[MachineKind, str] = {
     "served": "seed IS NULL AND served",
     "simulated": "seed IS NOT NULL",
 }
-_READ = """r.run_id, procedure, rig, uut, started, seed, visit, outcome, name, quantity, place, unit, value, u, expanded, dof,
-    p, lower, upper, verdict, settings, firmware, calibrations, parameters, certificates, served,
-    overdue"""
+_READ = """r.run_id, procedure, rig, uut, started, seed, visit, outcome, name, quantity, place, unit, data, settings, firmware,
+    calibrations, parameters, certificates, served, overdue"""
+DATA = 12  # its place there
 
 
 def add(run_dir: Path) -> None:
@@ -55,37 +54,40 @@ def entries(
     where, values = _chosen(procedure, rig, failed, machine)
     query = f"SELECT {RUN_COLUMNS} FROM runs r JOIN kinds USING (kind) {where} ORDER BY started {{0}}, r.run_id {{0}}"
     with uncollected():
-        return [IndexEntry._make(row) for row in _read(root, lambda db: _there(db, root, query, values, last))]
+        return [IndexEntry._make(row) for row in _read(root, lambda db, there: _there(db, query, values, last, there))]
 
 
 def listing(
     root: Path, *, procedure: str | None = None, rig: str | None = None, failed: bool = False, last: int | None = None,
     machine: MachineKind | None = None, timed: bool = False,
 ) -> tuple[list[tuple[Any, ...]], dict[int, Kind]]:  # fmt: skip
-    """What `entries` gives, quicker of very many runs: of each its name and the number of its kind, `timed` with its beginning
-    and end; and all kinds by their numbers."""
+    """What `entries` gives, quicker of very many runs: of each its name, its number and that of its kind, `timed` with its
+    beginning and end; and all kinds by their numbers."""
     if not root.is_dir():
         return [], {}
     where, values = _chosen(procedure, rig, failed, machine)
     wanted = f"WHERE kind IN (SELECT kind FROM kinds {where})" if where else ""
     times = ", started, ended" if timed else ""
-    query = f"SELECT run_id, kind{times} FROM runs {wanted} ORDER BY started {{0}}, run_id {{0}}"
-
-    def asked(db: sqlite3.Connection) -> tuple[list[tuple[Any, ...]], dict[int, Kind]]:
-        return _there(db, root, query, values, last), _kinds(db)
-
+    query = f"SELECT run_id, run, kind{times} FROM runs {wanted} ORDER BY started {{0}}, run_id {{0}}"
     with uncollected():
-        return _read(root, asked)
+        return _read(root, lambda db, there: (_there(db, query, values, last, there), _kinds(db)))
 
 
-def _kinds(db: sqlite3.Connection, where: str = "", values: tuple[str, ...] = ()) -> dict[int, Kind]:
+def kinds(root: Path) -> list[Kind]:
+    """Of what kinds the runs in `root` are."""
+    if not root.is_dir():
+        return []
+    return _read(root, lambda db, there: list(_kinds(db, "WHERE kind IN (SELECT kind FROM runs)").values()))
+
+
+def _kinds(db: sqlite3.Connection, where: str = "", values: tuple[str | int, ...] = ()) -> dict[int, Kind]:
     found = db.execute(f"SELECT kind, {KIND} FROM kinds {where}", values)
     return {number: Kind._make(kind) for number, *kind in found}
 
 
 def results(
     root: Path, *, quantity: str | None = None, procedure: str | None = None, rig: str | None = None, failed: bool = False,
-    last: int | None = None, of: Sequence[str] | None = None, machine: MachineKind | None = None,
+    last: int | None = None, of: Sequence[str] | None = None, machine: MachineKind | None = None, seed: int | None = None,
 ) -> list[Result]:  # fmt: skip
     """Results of the runs in `root`, oldest run first, in the record's order within a run; those deleted since left out.
 
@@ -94,35 +96,52 @@ def results(
             all that is measured of it, where nothing has that very name.
         last: the newest so many runs that have any.
         of: the names of some runs: of these alone.
+        seed: of this virtual machine alone.
     """
     if not root.is_dir():
         return []
-    where, values = _chosen(procedure, rig, failed, machine, of)
+    where, values = _chosen(procedure, rig, failed, machine, of, seed)
     # The newest few are found by going back through the runs, all of a series where they lie together.
     tables = "runs r CROSS JOIN results s ON s.run = r.run" if last or of else "results s JOIN runs r USING (run)"
     tables += " JOIN kinds USING (kind) JOIN names n ON n.number = s.number JOIN made_with USING (made)"
 
-    def asked(db: sqlite3.Connection) -> list[tuple[Any, ...]]:
+    def asked(db: sqlite3.Connection, there: set[str] | None) -> list[tuple[Any, ...]]:
         named = "" if quantity is None else f" AND {_named(db, quantity)}"
         query = (f"SELECT {_READ} FROM {tables} {where or 'WHERE 1'}{named} "
                  "ORDER BY started {0}, r.run_id {0}, ordinal {0}")  # fmt: skip
-        return _there(db, root, query, values, last if of is None else len(of))
+        return _there(db, query, values, last if of is None else len(of), there)
 
     with uncollected():
-        return [Result._make((*row, root)) for row in _read(root, asked)]
+        return [_result(row, root) for row in _read(root, asked)]
 
 
-def numbers(root: Path, quantity: str) -> list[Numbers]:
-    """What all runs have measured of a quantity, as `results` has it, in no order; of runs deleted since too."""
+def _result(row: tuple[Any, ...], root: Path) -> Result:
+    data = json.loads(row[DATA])
+    return Result._make((*row[:DATA], *(data[key] for key in NUMBERS), *row[DATA + 1 :], root))
 
-    def asked(db: sqlite3.Connection) -> list[Numbers]:
-        called = {number: rest for number, *rest in db.execute("SELECT number, name, unit FROM names")}
-        query = f"""SELECT run_id, s.number, value, u, expanded, dof, p, lower, upper, verdict
-            FROM results s JOIN runs USING (run) WHERE {_named(db, quantity)}"""
-        return [Numbers(run, *called[number], *rest) for run, number, *rest in db.execute(query)]
+
+def shown(
+    root: Path, quantity: str, *, as_json: bool = False, runs: Sequence[int] | None = None
+) -> dict[str, dict[int, str]]:
+    """What runs have measured of a quantity, as text or as JSON: by name, of which one word may mean several, and by the number
+    of the run; with `runs` of these alone."""
+
+    def asked(db: sqlite3.Connection) -> dict[str, dict[int, str]]:
+        called = dict(db.execute("SELECT number, name FROM names"))
+        column, of = (
+            "data" if as_json else "told",
+            "" if runs is None else "AND run IN (SELECT value FROM json_each(?))",
+        )
+        values = () if runs is None else (json.dumps(list(runs)),)
+        found: dict[str, dict[int, str]] = {}
+        for number in _meant(db, quantity):
+            query = f"SELECT run, {column} FROM results NOT INDEXED WHERE number = {number} {of}"
+            if texts := dict(db.execute(query, values)):
+                found.setdefault(called[number], {}).update(texts)
+        return found
 
     with uncollected():
-        return answered(root, asked) if root.is_dir() else []
+        return answered(root, asked) if root.is_dir() else {}
 
 
 def machines(root: Path, quantity: str, procedure: str | None = None, rig: str | None = None) -> Counter[MachineKind]:
@@ -146,7 +165,7 @@ def names(root: Path) -> list[str]:
     if not root.is_dir():
         return []
     query = "SELECT name FROM names UNION SELECT full FROM names ORDER BY 1"
-    return _read(root, lambda db: [str(name) for (name,) in db.execute(query)])
+    return _read(root, lambda db, there: [str(name) for (name,) in db.execute(query)])
 
 
 def _meant(db: sqlite3.Connection, asked: str) -> list[int]:
@@ -164,10 +183,11 @@ def _named(db: sqlite3.Connection, quantity: str) -> str:
 
 
 def _chosen(
-    procedure: str | None, rig: str | None, failed: bool, machine: MachineKind | None, of: Sequence[str] | None = None
-) -> tuple[str, tuple[str, ...]]:
+    procedure: str | None, rig: str | None, failed: bool, machine: MachineKind | None, of: Sequence[str] | None = None,
+    seed: int | None = None,
+) -> tuple[str, tuple[str | int, ...]]:  # fmt: skip
     """The condition of a query for runs, with its values."""
-    asked = {"procedure = ?": procedure, "rig = ?": rig}
+    asked: dict[str, str | int | None] = {"procedure = ?": procedure, "rig = ?": rig, "seed = ?": seed}
     conditions = [text for text, value in asked.items() if value is not None]
     values = tuple(v for v in asked.values() if v is not None)
     conditions += [f"outcome NOT IN {SOUND}"] if failed else []
@@ -179,27 +199,18 @@ def _chosen(
 
 
 def _there(
-    db: sqlite3.Connection, root: Path, query: str, values: tuple[str, ...], last: int | None
+    db: sqlite3.Connection, query: str, values: tuple[str | int, ...], last: int | None, there: set[str] | None
 ) -> list[tuple[Any, ...]]:
-    """Rows of runs that are still there, oldest first; of so many runs at most. `query` has `{0}` for the order. One listing of
-    the folder is quicker than to look for each of very many runs, and slower than to look for a few."""
+    """Rows of runs that are still there, oldest first; of so many runs at most. `query` has `{0}` for the order; `there` are
+    the names in the folder, where the index has others."""
+    found = db.execute(query.format("ASC" if last is None else "DESC"), values)
+    rows = found if there is None else (row for row in found if row[0] in there)
     if last is None:
-        present = set(os.listdir(root))
-        return [row for row in db.execute(query.format("ASC"), values) if row[0] in present]
-    kept: list[list[tuple[Any, ...]]] = []
-    for run_id, rows in groupby(db.execute(query.format("DESC"), values), key=itemgetter(0)):
-        if (root / run_id).is_dir():
-            kept.append(list(rows))
-            if len(kept) == last:
-                break
-    return [row for rows in reversed(kept) for row in reversed(rows)]
+        return list(rows)
+    newest = [list(of_run) for _, of_run in islice(groupby(rows, key=itemgetter(0)), last)]
+    return [row for of_run in reversed(newest) for row in reversed(of_run)]
 
 
-def _read(root: Path, ask: Callable[[sqlite3.Connection], T]) -> T:
-    """As `_answered`, of all runs that are there: also of those that nobody put in."""
-
-    def asked(db: sqlite3.Connection) -> T:
-        take_in(db, root)
-        return ask(db)
-
-    return answered(root, asked)
+def _read(root: Path, ask: Callable[[sqlite3.Connection, set[str] | None], T]) -> T:
+    """As `answered`, of all runs that are there and no others: `ask` has what `take_in` found."""
+    return answered(root, lambda db: ask(db, take_in(db, root)))

@@ -8,6 +8,7 @@ import json
 from bench.findings import CERTIFICATE_OVERDUE, SIMULATED_CONTROLLER
 from bench.record.records import Measurement, Record, read_record
 from bench.record.setup import Setup
+from bench.record.told import with_unit
 from bench.rigfile.aliases import in_full
 from bench.rigfile.certificates import numbers_told
 from bench.run.indexrow import IndexEntry, MadeWith, Row
@@ -45,16 +46,25 @@ def digest(content: object) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:DIGITS]
 
 
-def _result(m: Measurement, record: Record) -> tuple[tuple[str, ...], tuple[float | str | None, ...]]:
+def _result(m: Measurement, record: Record) -> tuple[tuple[str, ...], tuple[str | None, ...]]:
     setup = record.setup
     name = f"{m.name}@{m.where}" if m.where else m.name
     full = in_full({} if setup is None else setup.aliases, name)
     kind, _, place = full.partition("@")
-    lower, upper = (None, None) if m.limit is None else (m.limit.low, m.limit.high)
-    return (name, full, kind, place, m.unit), (
-        m.value, m.standard_uncertainty, m.expanded_uncertainty, m.dof, m.coverage_probability or PROBABILITY, lower, upper,
-        m.verdict.value, _certificates(m, setup), _overdue(m, record),
-    )  # fmt: skip
+    value, half = m.value, m.expanded_uncertainty
+    told = "missing" if value is None or half is None else with_unit(value, half, m.unit)
+    return (name, full, kind, place, m.unit), (told, _as_json(m), _certificates(m, setup), _overdue(m, record))
+
+
+def _as_json(m: Measurement) -> str:
+    """As `bench runs --json` shows it."""
+    low, high = (None, None) if m.limit is None else (m.limit.low, m.limit.high)
+    data = {
+        "value": m.value, "unit": m.unit, "standard_uncertainty": m.standard_uncertainty,
+        "expanded_uncertainty": m.expanded_uncertainty, "dof": m.dof,
+        "coverage_probability": m.coverage_probability or PROBABILITY, "low": low, "high": high, "verdict": m.verdict.value,
+    }  # fmt: skip
+    return json.dumps(data, ensure_ascii=False)
 
 
 def _certificates(m: Measurement, setup: Setup | None) -> str:

@@ -18,7 +18,7 @@ from bench.run.indexrow import CALLED, KIND, MADE, TABLES, Row
 from bench.rundir import RunDirectory, named_as_run, runs_in
 
 NAME = "index.sqlite"
-VERSION = 7  # of the tables; another one is rebuilt
+VERSION = 8  # of the tables, and of how results are told in them; another one is rebuilt
 TICK_NS = 1_000_000_000  # two changes of a folder that are nearer may have one time
 LISTED_NS = 10_000_000_000  # so much older an index is made that knows all of its folder: nothing else makes it so
 T = TypeVar("T")
@@ -36,35 +36,43 @@ def rebuild(root: Path) -> list[str]:
         return _filled(root)
 
 
-def take_in(db: sqlite3.Connection, root: Path) -> None:
-    """Put in the runs of processes that were killed, and those that were copied here. The folder is listed where something was
-    made in it, or taken away, since it was listed last: the time of the index's file tells."""
+def take_in(db: sqlite3.Connection, root: Path) -> set[str] | None:
+    """Put in the runs of processes that were killed, and those that were copied here; take out those that were deleted. The
+    folder is listed where something was made in it, or taken away, since it was listed last: the index's file's time tells.
+
+    Returns the names in the folder where the index cannot be made to have these alone.
+    """
     own, changed_ns = root / NAME, root.stat().st_mtime_ns
     if own.stat().st_mtime_ns == changed_ns - LISTED_NS:
-        return
+        return None
     known = {run_id for (run_id,) in db.execute("SELECT run_id FROM runs")}
-    new = sorted(name for name in set(os.listdir(root)) - known if named_as_run(name))
+    there = set(os.listdir(root))  # after those, so that one that begins and ends meanwhile is new and not gone
+    new, gone = sorted(filter(named_as_run, there - known)), known - there
     messages: list[str] = []
-    if new:
+    if new or gone:
         try:
             db.execute("BEGIN IMMEDIATE")  # a run that ends meanwhile puts itself in afterwards, in place of this
             rows = list(_ended(new, root, messages))
             for row in rows:
                 put(db, row)
+            for run_id in gone:
+                _take_out(db, run_id)
             db.commit()
         except (
             sqlite3.OperationalError
         ) as error:  # a folder of somebody else's, or one in which somebody writes for long
             db.rollback()
-            log.warning(f"{own}: {len(new)} runs are left out of the index: {error}")
-            return
+            if new:
+                log.warning(f"{own}: {len(new)} runs are left out of the index: {error}")
+            return there
         for message in messages:
             log.warning(message)
         if len(rows) + len(messages) < len(new):
-            return  # one that goes on may be killed, and nothing in the folder would change
+            return None  # one that goes on may be killed, and nothing in the folder would change
     if time.time_ns() - changed_ns > TICK_NS:
         with suppress(OSError):
             os.utime(own, ns=(changed_ns, changed_ns - LISTED_NS))
+    return None
 
 
 def _ended(names: Iterable[str], root: Path, messages: list[str]) -> Iterator[Row]:
@@ -122,18 +130,20 @@ def _filled(root: Path) -> list[str]:
 
 def put(db: sqlite3.Connection, row: Row) -> None:
     """A run and its results, in place of what stood there of that run."""
-    for (run,) in db.execute("SELECT run FROM runs WHERE run_id = ?", row.entry[:1]).fetchall():
-        db.execute("DELETE FROM results WHERE run = ?", (run,))
-        db.execute("DELETE FROM runs WHERE run = ?", (run,))
     e = row.entry
+    _take_out(db, e.run_id)
     kept = (_kept(db, "kinds", "kind", KIND, e.kind), _kept(db, "made_with", "made", MADE, row.made_with))
     of_run = (None, e.run_id, e.started, e.ended, *kept)
     run = db.execute(f"INSERT INTO runs VALUES ({', '.join('?' * len(of_run))})", of_run).lastrowid
-    for ordinal, (called, numbers) in enumerate(row.results):
+    for ordinal, (called, shown) in enumerate(row.results):
         number = _kept(db, "names", "number", CALLED, called)
-        db.execute(
-            "INSERT INTO results VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", (number, run, ordinal, *numbers)
-        )
+        db.execute("INSERT INTO results VALUES (?, ?, ?, ?, ?, ?, ?)", (number, run, ordinal, *shown))
+
+
+def _take_out(db: sqlite3.Connection, run_id: str) -> None:
+    for (run,) in db.execute("SELECT run FROM runs WHERE run_id = ?", (run_id,)).fetchall():
+        db.execute("DELETE FROM results WHERE run = ?", (run,))
+        db.execute("DELETE FROM runs WHERE run = ?", (run,))
 
 
 def _kept(db: sqlite3.Connection, table: str, key: str, columns: str, shared: tuple[str | int | None, ...]) -> int:

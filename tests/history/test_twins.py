@@ -13,6 +13,8 @@ from hypothesis import strategies as st
 from made_histories import record
 
 from bench.cli.__main__ import main
+from bench.record.records import read_record
+from bench.record.told import with_unit
 from bench.run import index
 
 Bench = tuple[int, str, str]
@@ -57,6 +59,12 @@ def test_the_twin_is_followed_where_it_is_asked_for(mixed: Path, capsys: pytest.
     assert trend_of(capsys, mixed, "--machine", "served")[0] == [76.0, 76.1, 76.2, 76.3]
     assert trend_of(capsys, mixed, "--machine", "simulated", "--seed", "4")[0] == [78.0, 78.1, 78.2, 78.3]
     assert trend_of(capsys, mixed, "--seed", "3")[0] == [77.0, 77.1, 77.2, 77.3]
+    assert trend_of(capsys, mixed, "--seed", "3", "--last", "2")[0] == [77.2, 77.3]
+    assert (
+        "older ones are neither shown"
+        in told(capsys, "trend", "K_i", "--out", str(mixed), "--seed", "3", "--last", "2")[1]
+    )
+    assert "older" not in told(capsys, "trend", "K_i", "--out", str(mixed), "--seed", "3", "--last", "4")[1]
 
 
 def test_what_is_several_machines_is_refused_by_what_tells_them_apart(
@@ -124,7 +132,7 @@ def test_a_quick_listing_has_what_the_entries_have(
 ) -> None:
     found, kinds = index.listing(standing, rig=rig, failed=failed, last=last, machine=machine, timed=True)
     entries = index.entries(standing, rig=rig, failed=failed, last=last, machine=machine)
-    assert [(n, kinds[k], s, e) for n, k, s, e in found] == [(x.run_id, x.kind, x.started, x.ended) for x in entries]
+    assert [(n, kinds[k], s, e) for n, _, k, s, e in found] == [(x.run_id, x.kind, x.started, x.ended) for x in entries]
 
 
 @pytest.fixture(scope="module")
@@ -135,11 +143,24 @@ def standing(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return root
 
 
-def test_numbers_are_those_of_the_results(mixed: Path) -> None:
-    for quantity in ("K_i", "K", "Q"):
-        one = sorted(index.numbers(mixed, quantity))
-        other = sorted(index.results(mixed, quantity=quantity))
-        assert len(one) == len(other) == (0 if quantity == "Q" else 16) or quantity == "K"
-        assert [n._asdict() for n in one] == [
-            {k: getattr(r, k) for k in n._fields} for n, r in zip(one, other, strict=True)
-        ]
+@pytest.mark.parametrize("few", [True, False])
+def test_what_is_listed_of_results_is_what_the_records_say(few: bool, mixed: Path) -> None:
+    """To the last bit, although the index keeps texts: 75 + 4 / 3 has all digits that a number can have."""
+    record(mixed, 16, 75 + 4 / 3)
+    listed, _ = index.listing(mixed)
+    runs = [number for _, number, _ in listed] if few else None
+    (texts,), (data,) = (index.shown(mixed, "K_i", as_json=k, runs=runs).values() for k in (False, True))
+    for run_id, number, _ in listed:
+        m = next(m for m in read_record(mixed / run_id / "record.json").measurements if m.name == "K_i")
+        assert m.value is not None
+        assert m.expanded_uncertainty is not None
+        assert texts.pop(number) == with_unit(m.value, m.expanded_uncertainty, m.unit)
+        low, high = (m.limit.low, m.limit.high) if m.limit else (None, None)
+        assert json.loads(data.pop(number)) == {
+            "value": m.value, "unit": m.unit, "standard_uncertainty": m.standard_uncertainty,
+            "expanded_uncertainty": m.expanded_uncertainty, "dof": m.dof, "coverage_probability": m.coverage_probability,
+            "low": low, "high": high, "verdict": str(m.verdict),
+        }  # fmt: skip
+    assert (texts, data) == ({}, {})
+    assert index.shown(mixed, "Q") == {}
+    assert index.shown(mixed, "K_i", runs=[]) == {}
