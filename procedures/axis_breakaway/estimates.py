@@ -14,14 +14,14 @@ from bench.rigfile import RigFile
 from bench.rigfile.stage import StageAxis
 from bench.uncertainty import Estimate, Influence, propagate
 from procedures.axis_breakaway import fit
+from procedures.axis_breakaway.alone import Bearing, alone, bearing, circle, inertia
 from procedures.axis_breakaway.fit import Axis
 from procedures.axis_breakaway.plan import Plan
-from procedures.axis_breakaway.sequence import WAYS, chosen, loads, mass, pair, seen
+from procedures.axis_breakaway.sequence import PULLS, WAYS, chosen, loads, mass, pair, seen
 from procedures.axis_breakaway.steps import Ramp
 from procedures.axis_friction.fit import pseudo
 from procedures.stages.known_loads import force, load_inputs
 from procedures.stages.map_bends import doubts
-from procedures.stages.pairs import MACHINE
 from procedures.stages.spread import turns
 
 Array = npt.NDArray[np.float64]
@@ -42,12 +42,13 @@ class Data:
 @dataclass(frozen=True)
 class Result:
     """By axis what it breaks away at, N or N m, and the greatest force by which a count delays that; shares of helices (h,);
-    `estimates` by name and where."""
+    of axes that were pulled beside, what `alone.circle` gives; `estimates` by name and where."""
 
     data: Data
     at: Mapping[str, float]
     beyond: Mapping[str, float]
     shares: Array
+    beside: Mapping[str, tuple[Array, Array]]
     estimates: dict[tuple[str, str], Estimate] = field(default_factory=dict)
 
 
@@ -56,8 +57,8 @@ def named(axis: StageAxis) -> str:
     return f"{BREAKAWAY}_angle" if turns(axis) else BREAKAWAY
 
 
-def arrays(ramps: Sequence[Ramp], rig: RigFile, plan: Plan, late: Mapping[str, float]) -> Data:
-    """Ramps by axis, load and repeat, forces less what a count has them go on by.
+def arrays(ramps: Sequence[Ramp], rig: RigFile, plan: Plan) -> Data:
+    """Ramps as `alone` gives them by axis, load and repeat.
 
     Raises:
         AnalysisError: some are missing.
@@ -68,11 +69,11 @@ def arrays(ramps: Sequence[Ramp], rig: RigFile, plan: Plan, late: Mapping[str, f
         for load in ("", *(s.name for s in loads(rig, axis))):
             for way in WAYS:
                 found = [_one(ramps, axis=name, load=load, way=way, repeat=k, turned=0) for k in range(plan.repeats)]
-                each[load, way] = np.array([r.force[name] - way * late[name] for r in found])
+                each[load, way] = np.array([r.force[name] for r in found])
         down, up = ((each[s.name, 1] + each[s.name, -1]) / 2 for s in sorted(loads(rig, axis), key=lambda s: s.sign))
         axes[name] = Axis(each["", 1], each["", -1], down, up)
     both = pair(rig, plan)
-    helix = None if both is None else _helix(ramps, both, plan, late)
+    helix = None if both is None else _helix(ramps, both, plan)
     return Data(of, axes, helix, plan.helix if helix is not None else (), plan.repeats)
 
 
@@ -84,27 +85,19 @@ def _one(ramps: Sequence[Ramp], **wanted: object) -> Ramp:
     return found[0]
 
 
-def _helix(ramps: Sequence[Ramp], both: tuple[StageAxis, StageAxis], plan: Plan, late: Mapping[str, float]) -> Array:
+def _helix(ramps: Sequence[Ramp], both: tuple[StageAxis, StageAxis], plan: Plan) -> Array:
     out = np.empty((plan.repeats, len(plan.helix), 4, 2))
     for k in range(plan.repeats):
         for j, share in enumerate(plan.helix):
             for m, (way, turned) in enumerate((w, t) for w in WAYS for t in WAYS):
                 one = _one(ramps, share=share, repeat=k, way=way, turned=turned)
-                force = np.array([one.force[a.name] for a in both])
-                out[k, j, m] = force - np.sign(force) * [late[a.name] for a in both]
+                out[k, j, m] = [one.force[a.name] for a in both]
     return out
 
 
-def late_by(ramps: Sequence[Ramp], rig: RigFile, plan: Plan) -> dict[str, float]:
-    """Of each axis, the greatest force by which a count delays what is seen of it."""
-    out = {}
-    for axis in chosen(rig, plan):
-        rises = [abs(r.rises[axis.name]) for r in ramps if r.axis == axis.name and not r.turned]
-        number, count = rig.machine.get(MACHINE[axis.unit]), seen(axis)
-        out[axis.name] = fit.beyond(
-            0.0 if number is None else number.value, count, float(np.median(rises)) if rises else 0.0
-        )
-    return out
+def late_by(b: Bearing, rig: RigFile, plan: Plan) -> dict[str, float]:
+    """Of each axis, the greatest force by which a count delays what is seen of it, with nothing beside."""
+    return {a.name: fit.beyond(inertia(a, rig), seen(a), b.rise[a.name]) for a in chosen(rig, plan)}
 
 
 def results(ramps: Sequence[Ramp], rig: RigFile, plan: Plan) -> Result:
@@ -113,9 +106,8 @@ def results(ramps: Sequence[Ramp], rig: RigFile, plan: Plan) -> Result:
     Raises:
         AnalysisError: ramps are missing.
     """
-    most = late_by(ramps, rig, plan)
-    late = {name: fit.MEAN * value for name, value in most.items()}
-    data = arrays(ramps, rig, plan, late)
+    b = bearing(ramps, rig, plan)
+    most, data = late_by(b, rig, plan), arrays(alone(ramps, rig, plan, b), rig, plan)
     inputs: dict[str, Estimate] = {}
     for axis in data.of.values():
         inputs |= load_inputs(rig, loads(rig, axis), (mass(axis, plan),))
@@ -125,38 +117,45 @@ def results(ramps: Sequence[Ramp], rig: RigFile, plan: Plan) -> Result:
     each = pseudo([_vector(data, rig, plan, values, np.delete(whole, k)) for k in whole], at)
     names = _names(data)
     told = propagate(lambda p: dict(zip(map("@".join, names), _vector(data, rig, plan, p, whole), strict=True)), inputs)
-    bends = _by_doubts(ramps, rig, plan, late, values, at)
+    doubted = _by_doubts(ramps, rig, plan, b, values, at) | _by_bends(ramps, rig, plan, b, values, at)
+    counted = {
+        own: (_by_count(data, rig, plan, values, own, by) - at) / by
+        for own, width in most.items()
+        if (by := fit.DEVIATION * width) > 0
+    }
+    times = {own: len(WAYS) * plan.repeats * (len(PULLS) if (own, 1) in b.bends else 1) for own in most}
     out = {}
     for j, (name, where) in enumerate(names):
         unit = "1" if name == SHARE else data.of[where].force
         u = float(each[:, j].std(ddof=1)) / math.sqrt(plan.repeats)
         e = told["@".join((name, where))] + _scatter(f"{name}/{where}", u, unit, plan.repeats - 1.0)
-        for influence, slope in bends.items():
+        for influence, slope in doubted.items():
             e = e + Estimate(0.0, "", {influence: float(slope[j])})
-        for own, width in most.items():
-            moves = float(_by_count(data, rig, plan, values, own, width)[j] - at[j])
-            e = e + _count(data.of[own], width, moves)
+        for own, slopes in counted.items():
+            e = e + _count(data.of[own], most[own], times[own], float(slopes[j]))
         out[name, where] = Estimate(e.value, unit, e.sensitivities)
-    return Result(data, {a: float(at[j]) for j, a in enumerate(data.of)}, most, at[len(data.of) :], out)
+    alone_at = {a: float(at[j]) for j, a in enumerate(data.of)}
+    return Result(data, alone_at, most, at[len(data.of) :], circle(ramps, rig, plan, b), out)
 
 
 def _scatter(identity: str, u: float, unit: str, dof: float) -> Estimate:
     return Estimate.of(0.0, Influence(f"scatter/{identity}", "scatter of the repeats", u, unit, "A", "normal", dof))
 
 
-def _count(axis: StageAxis, width: float, moves: float) -> Estimate:
-    """Where in its count an axis sticks is known to nobody, N or N m: `moves` for half the width."""
-    u = width / math.sqrt(12)
+def _count(axis: StageAxis, most: float, ramps: int, slope: float) -> Estimate:
+    """Where in its count an axis sticks before each of so many ramps is known to nobody: `slope` for each N or N m by which a
+    count delays it in the mean. The slide before a ramp leaves it anywhere in a count, so that they are off each by itself."""
+    u = fit.DEVIATION * most / math.sqrt(ramps)
     if u == 0:
         return Estimate.exact(0.0)
-    known = Influence(f"counts/{axis.name}", f"where in a count {axis.name} sticks", u, axis.force, "B", "rectangular")
-    return Estimate(0.0, "", {known: moves / (width / 2)})
+    known = Influence(f"counts/{axis.name}", f"where in a count {axis.name} sticks", u, axis.force, "B", "normal")
+    return Estimate(0.0, "", {known: slope})
 
 
-def _by_count(data: Data, rig: RigFile, plan: Plan, p: Mapping[str, float], axis: str, width: float) -> Array:
-    """With all forces of an axis by half the width nearer to nothing."""
+def _by_count(data: Data, rig: RigFile, plan: Plan, p: Mapping[str, float], axis: str, by: float) -> Array:
+    """With all forces of an axis nearer to nothing by so much."""
     a = data.axes[axis]
-    axes = {**data.axes, axis: replace(a, plus=a.plus - width / 2, minus=a.minus + width / 2)}
+    axes = {**data.axes, axis: replace(a, plus=a.plus - by, minus=a.minus + by)}
     return _vector(replace(data, axes=axes), rig, plan, p, np.arange(data.repeats))
 
 
@@ -185,13 +184,27 @@ def _weights(rig: RigFile, axis: StageAxis, plan: Plan, p: Mapping[str, float]) 
     return -force(by[-1], mass(axis, plan), p), force(by[1], mass(axis, plan), p)
 
 
-def _by_doubts(ramps: Sequence[Ramp], rig: RigFile, plan: Plan, late: Mapping[str, float], p: Mapping[str, float], at: Array
+def _by_doubts(ramps: Sequence[Ramp], rig: RigFile, plan: Plan, b: Bearing, p: Mapping[str, float], at: Array
                ) -> dict[Influence, Array]:  # fmt: skip
     """Sensitivities of the results to what bends the map, as in `axis_friction.estimates`."""
     out: dict[Influence, Array] = {}
     for k, influence in enumerate(doubts(rig, plan.saturation_share)):
         if influence.u > 0:
             moved = [replace(r, force={a: f + influence.u * r.moves[a][k] for a, f in r.force.items()}) for r in ramps]
-            data = arrays(moved, rig, plan, late)
+            data = arrays(alone(moved, rig, plan, b), rig, plan)
             out[influence] = (_vector(data, rig, plan, p, np.arange(plan.repeats)) - at) / influence.u
+    return out
+
+
+def _by_bends(ramps: Sequence[Ramp], rig: RigFile, plan: Plan, b: Bearing, p: Mapping[str, float], at: Array
+              ) -> dict[Influence, Array]:  # fmt: skip
+    """Likewise to how much an axis' friction bends with what acts beside, as a share."""
+    out: dict[Influence, Array] = {}
+    for (name, way), bent in b.bends.items():
+        if bent.u > 0:
+            more = {**b.bends, (name, way): replace(bent, limit=bent.limit / math.sqrt(1 + bent.u))}
+            data = arrays(alone(ramps, rig, plan, b, more), rig, plan)
+            about = f"what acts beside takes off {name} {'up' if way > 0 else 'down'}, share"
+            known = Influence(f"bend/{name}/{'up' if way > 0 else 'down'}", about, bent.u, "1", "A", "normal")
+            out[known] = (_vector(data, rig, plan, p, np.arange(plan.repeats)) - at) / bent.u
     return out

@@ -11,11 +11,13 @@ from procedures.axis_breakaway.estimates import Result
 
 
 def all_figures(r: Result) -> Iterator[Figure]:
-    """The circle, then each axis."""
+    """The circle, then each axis, and what acts beside it."""
     if r.data.helix is not None:
         yield _circle(r)
     for name in r.data.of:
         yield _axis(r, name)
+        if name in r.beside:
+            yield _beside(r, name)
 
 
 def _axis(r: Result, name: str) -> Figure:
@@ -29,6 +31,16 @@ def _axis(r: Result, name: str) -> Figure:
                "by known loads.")  # fmt: skip
     return Figure(f"breakaway-{name}", f"Breakaway: {name}", caption, "repeat", f"force by the map / {unit}", series,
                   lines=(("result", per * r.at[name]),))  # fmt: skip
+
+
+def _beside(r: Result, name: str) -> Figure:
+    s, left = r.beside[name]
+    angle = np.linspace(-1, 1, 97) * np.arcsin(min(1.1 * float(np.abs(s).max()), 1.0))
+    series = (Series("ramps", s, left, "points"), Series("one friction along the path", np.sin(angle), np.cos(angle)))
+    caption = ("What is left of its friction where the other axis is pulled: beside what of that one's own, with what the "
+               "map crosses, as shares. Points on a line that is level would be axes that rub apart.")  # fmt: skip
+    return Figure(f"beside-{name}", f"Breakaway beside another axis: {name}", caption, "beside, share", f"{name}, share",
+                  series)  # fmt: skip
 
 
 def _circle(r: Result) -> Figure:

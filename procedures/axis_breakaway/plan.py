@@ -13,8 +13,9 @@ class Plan(BenchPlan):
     axes: tuple[str, ...] = ()  # of the rig; none: all that it positions
     ramp_m_s: float = Field(1e-4, gt=0)  # of the set point, while the axis sticks
     ramp_rad_s: float = Field(2e-3, gt=0)
-    span_m: float = Field(1.2e-3, gt=0)  # to and fro: more than both friction bands
+    span_m: float = Field(1.2e-3, gt=0)  # of a slide: more than both friction bands
     span_rad: float = Field(0.045, gt=0)
+    pull_rad: float = Field(2.2e-3, ge=0)  # to each side, of the set point around beside an axis along; 0: not pulled
     slide_rad_s: float = Field(0.02, gt=0)  # around, before a helix is ramped
     repeats: int = Field(5, ge=4)  # of everything, at as many places
     spread_m: float = Field(5e-3, ge=0)  # to each side of the middle of the travel

@@ -23,7 +23,19 @@ from procedures.axis_breakaway import figures as drawn
 from procedures.axis_breakaway.estimates import Result
 from procedures.axis_breakaway.moves import acquire
 from procedures.axis_breakaway.plan import Plan
-from procedures.axis_breakaway.sequence import INTEGRATORS, RADIUS, chosen, helix, loads, mass, pair, place, ramp
+from procedures.axis_breakaway.sequence import (
+    BACK,
+    INTEGRATORS,
+    PULLS,
+    RADIUS,
+    chosen,
+    helix,
+    loads,
+    mass,
+    pair,
+    place,
+    ramp,
+)
 from procedures.axis_breakaway.sequence import step_count as counted
 from procedures.axis_breakaway.steps import STATE, read_ramps
 from procedures.shared.default_masses import nth_lightest
@@ -80,7 +92,7 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
         rate, span = ramp(axis, plan)
         for repeat in (0, plan.repeats - 1):
             for side in (-1, 1):
-                wanted = {axis.target: place(axis, plan, repeat) + side * span / 2, axis.rate: rate}
+                wanted = {axis.target: place(axis, plan, repeat) + side * (0.5 + BACK) * span, axis.rate: rate}
                 yield from (f"{axis.name}: {problem}" for problem in envelope.problems_of(wanted))
     if (both := pair(rig, plan)) is not None:
         for share in plan.helix:
@@ -133,11 +145,11 @@ procedure = Procedure(
     figures=figures,
     requires=requires,
     check=check,
-    step_count=lambda plan: 2 * plan.repeats * (6 + 2 * len(plan.helix)),
+    step_count=lambda plan: 2 * plan.repeats * (3 * (1 + (len(PULLS) if plan.pull_rad else 1)) + 2 * len(plan.helix)),
     steps_on=counted,
     untold=untold,
     left_out=left_out,
-    reached=("scatter/*", "counts/*"),
+    reached=("scatter/*", "counts/*", "bend/*"),
     assumes=assumptions.AXIS_BREAKAWAY,
     method=read_method(__file__),
     places=("helix",),

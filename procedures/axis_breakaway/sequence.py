@@ -9,9 +9,12 @@ from bench.rigfile import RigFile
 from bench.rigfile.stage import StageAxis, axes_of
 from procedures.axis_breakaway.plan import Plan
 from procedures.stages.known_loads import Source, sources
-from procedures.stages.spread import stands, turns
+from procedures.stages.spread import others, stands, turns
 
 WAYS = (1, -1)
+PULLS = (-1, 0, 1)  # of the axis around, beside an axis along that is ramped
+BACK = 0.25  # of the span, by which a set point goes back after a slide, so that its axis is held by about nothing
+ON = 0.2  # of the span, by which a ramp goes on where a slide ended
 INTEGRATORS = "integrators"
 RADIUS = "bearing_radius"
 HELIX_PART = 0.6  # of the span around, that a helix is ramped by
@@ -46,6 +49,16 @@ def seen(axis: StageAxis) -> float:
 def place(axis: StageAxis, plan: Plan, repeat: int) -> float:
     """The middle of a ramp: somewhere else in every repeat, and within a count."""
     return stands(axis, repeat, plan.repeats, plan.spread_m)
+
+
+def beside(rig: RigFile, plan: Plan, axis: StageAxis) -> StageAxis | None:
+    """The axis around that is pulled while one along is ramped; None beside an axis around, or where the rig has none.
+
+    A force beside a torque takes nothing worth a correction off it: the loop along rests within some counts, below a tenth of
+    its friction, and what goes by the square of that is below half a per cent."""
+    if turns(axis) or plan.pull_rad == 0:
+        return None
+    return next((a for a in others(rig, axis) if turns(a)), None)
 
 
 def pair(rig: RigFile, plan: Plan) -> tuple[StageAxis, StageAxis] | None:
@@ -83,5 +96,7 @@ def helix(rig: RigFile, plan: Plan, both: tuple[StageAxis, StageAxis], share: fl
 
 def step_count(rig: RigFile, plan: Plan) -> int:
     """Ramps."""
-    count = sum(1 + len(loads(rig, a)) for a in chosen(rig, plan))
+    count = sum(
+        (1 + len(loads(rig, a))) * (1 if beside(rig, plan, a) is None else len(PULLS)) for a in chosen(rig, plan)
+    )
     return 2 * plan.repeats * (count + (2 * len(plan.helix) if pair(rig, plan) is not None else 0))

@@ -14,21 +14,23 @@ from bench.rigfile.stage import StageAxis, axes_of
 from procedures.axis_breakaway.fit import broke_away, rise
 from procedures.axis_breakaway.moves import HELIX, RAMP
 from procedures.axis_breakaway.plan import Plan
-from procedures.axis_breakaway.sequence import chosen, seen
+from procedures.axis_breakaway.sequence import WAYS, beside, chosen, seen
 from procedures.stages import spread
 from procedures.stages.map_bends import currents, moves
 
 Array = npt.NDArray[np.float64]
 STATE = "state"
 FEWEST = 100  # samples of a ramp
+BEFORE = 50  # samples: an axis on an edge of its counts throws its loop's force about for some
 AT_LIMIT = 0.98  # of the greatest force
 
 
 @dataclass(frozen=True)
 class Ramp:
     """One: by axis the `force` at the first change of a reading, as the controller gives it, N or N m, and how fast it `rises`
-    there, N/s or N m/s; `moved`: which axis' reading changed first, "" for none; `after` s from the beginning. `moves` as
-    those of passes at constant rates (`axis_friction.steps`)."""
+    there, N/s or N m/s; `beside`: what the axis beside it that is pulled, to the side `pull`, was given then; `moved`: which
+    of the axes that are ramped moves first, "" for none; `after` s from the beginning. `moves` as those of passes at constant
+    rates (`axis_friction.steps`)."""
 
     axis: str
     share: float
@@ -36,9 +38,11 @@ class Ramp:
     load: str
     way: int
     turned: int
+    pull: int
     moved: str
     after: float
     force: Mapping[str, float]
+    beside: float
     rises: Mapping[str, float]
     moves: Mapping[str, Array]
     limited: bool
@@ -51,7 +55,8 @@ class Ramp:
         """As findings name it."""
         kind = f", helix {self.share:g}" if self.turned else ""
         under = f", load {self.load}" if self.load else ""
-        return f"{self.axis}{kind}, {'up' if self.way > 0 else 'down'}, repeat {self.repeat + 1}{under}"
+        pulled = f", pulled {'up' if self.pull > 0 else 'down'} beside" if self.pull else ""
+        return f"{self.axis}{kind}, {'up' if self.way > 0 else 'down'}, repeat {self.repeat + 1}{under}{pulled}"
 
 
 def read_ramps(recording: Recording[Plan]) -> list[Ramp]:
@@ -76,17 +81,22 @@ def _ramp(recording: Recording[Plan], step: Step) -> Ramp:
     t, known = (data["t_ns"] - data["t_ns"][:1]) * 1e-9, rig.choices(STATE)
     sign = {name: turned if turned and spread.turns(a) else int(labels["way"]) for name, a in watched.items()}
     found = {name: broke_away(sign[name] * data[a.channel], seen(a)) for name, a in watched.items()}
-    first = min((at for at in found.values() if at is not None), default=None)
-    at = len(t) - 1 if first is None else first
+    gone = {name: at for name, at in found.items() if at is not None}
+    pulled = None if turned else beside(rig, recording.plan, axis)
+    both = [] if pulled is None else [broke_away(w * data[pulled.channel], seen(pulled)) for w in WAYS]
+    at = min((*gone.values(), *(k for k in both if k is not None)), default=len(t) - 1)
     forces = {name: data[a.given or a.asked] for name, a in watched.items()}
-    inside = {c: data[c][at : at + 1] for c in currents(rig)}
+    aside = None if pulled is None else data[pulled.given or pulled.asked][max(at - BEFORE, 0) : max(at, 1)]
+    inside = slice(max(at - BEFORE, 0), max(at, 1))
+    led = {c: data[c][inside] for c in currents(rig)}
     return Ramp(
         axis=axis.name, share=float(labels["share"]), repeat=int(labels["repeat"]), load=str(labels["load"]),
-        way=int(labels["way"]), turned=turned,
-        moved=next((n for n, k in found.items() if first is not None and k == first), ""), after=float(t[at]),
+        way=int(labels["way"]), turned=turned, pull=int(labels.get("pull", 0)),
+        moved=min((k, n) for n, k in gone.items())[1] if gone else "", after=float(t[at]),
         force={name: float(f[max(at - 1, 0)]) for name, f in forces.items()},
+        beside=0.0 if aside is None else float(np.median(aside)),
         rises={name: rise(t, f, at) for name, f in forces.items()},
-        moves={name: moves(rig, inside, f[at : at + 1])[:, 0] for name, f in forces.items()},
+        moves={name: moves(rig, led, f[inside]).mean(axis=1) for name, f in forces.items()},
         limited=any(_limited(recording, a, data, at) for a in watched.values()),
         states=tuple(known.get(int(code), str(int(code))) for code in np.unique(data[STATE])),
         lost=step.lost(), expected=step.expected(),
