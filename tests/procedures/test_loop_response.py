@@ -127,7 +127,7 @@ def test_the_reduced_model_is_faster() -> None:
 
 @pytest.mark.long
 def test_a_drawn_machine_is_within_its_intervals(tmp_path: Path) -> None:
-    done = run(tmp_path, axes=("x1", "z"))
+    done = run(tmp_path, axes=("x1", "z"), refined=9)
     assert wrong(done) == {}
     found, true = values(done), truth_of_motion(done)
     assert set(found) == {
