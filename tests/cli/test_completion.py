@@ -40,7 +40,7 @@ def offered(words: str, folder: Path) -> list[str]:
         ("bench run step --backend ''", ["sim", "live"]),
         ("bench run step --rig tsbs12-d", ["tsbs12-drag"]),
         ("bench check amb5", ["amb5dof"]),
-        ("bench campaign spindle", ["spindle-motion"]),
+        ("bench campaign spindle", ["spindle-motion", "spindle-rundown"]),
         ("bench export --to m", ["mcap", "mdf"]),
         ("bench serve mine", ["mine"]),
         ("bench run step --spec ''", []),
