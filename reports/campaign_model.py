@@ -111,7 +111,7 @@ def _sections(c: ChainContent, numbers: _Numbers) -> Iterator[Section]:
     yield Section("The steps", grid=_steps(c.steps))
     pictures = [numbers.picture(_of_run(figures.draw(f), s), False) for s in c.steps for f in s.figures]
     if pictures:
-        yield Section("What was measured", pictures=tuple(pictures), note="Error bars are 95 % intervals.")
+        yield Section("What was measured", pictures=tuple(pictures))
     found = [(s, f) for s in c.steps for f in s.findings]
     if found:
         yield Section("Findings", grid=_findings(found))

@@ -31,6 +31,7 @@ from reports import text
 from reports.figurestyle import DASHES, INK, MARKERS, PALETTE, STYLE
 
 WIDTH_IN, HEIGHT_IN = 3.42, 2.75  # 87 mm: half of the A4 text block
+BARS = "Error bars are 95 % intervals."
 MAX_LINE_POINTS = 1200  # about three per printed dot column at 300 dpi; beyond, min and max per bin
 
 
@@ -59,7 +60,14 @@ def draw(figure: Figure, height: float = 1.0) -> Drawn:
             svg = _svg(figure, height)
         except (ValueError, TypeError, OverflowError) as error:
             raise BenchError(f"figure {figure.key!r} cannot be drawn: {error}") from error
-    return Drawn(figure.key, figure.title, figure.caption, _with_own_ids(svg, figure.key))
+    return Drawn(figure.key, figure.title, _caption(figure), _with_own_ids(svg, figure.key))
+
+
+def _caption(figure: Figure) -> str:
+    """With what its error bars are, where it has any and its own words do not say so."""
+    drawn = any(s.u is not None and bool((np.abs(s.u) > 0).any()) for panel in _panels(figure) for s in panel.series)
+    told = any(words in figure.caption for words in ("95 % interval", "bars"))
+    return f"{figure.caption} {BARS}" if drawn and not told else figure.caption
 
 
 def _same_length(figure: Figure, series: Series) -> None:

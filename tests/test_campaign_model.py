@@ -23,6 +23,7 @@ from bench.campaign.model import (
 )
 from bench.procedure import Measured, Quantity
 from bench.record.records import Record, measurement, unfinished
+from bench.record.setup import Certified, Setup
 from bench.uncertainty import Estimate, Influence, correlation_matrix
 
 D1, D2 = "first-20260101T000000Z-aaaa", "second-20260101T000100Z-bbbb"
@@ -64,6 +65,22 @@ def test_identities_follow_the_rule_of_adoption() -> None:
     assert identity("geometry/amb_span", made) == "geometry/amb_span"
     assert identity("scatter/1", made) == f"{D2}/scatter/1"
     assert identity(f"{D1}/scatter/1", made) == f"{D1}/scatter/1"
+    assert identity("encoders/x/pitch", made) == f"{D2}/encoders/x/pitch"  # an old record does not say what it is
+
+
+def test_a_scale_is_one_influence_whatever_its_form() -> None:
+    """By hand: one run has the pitch as a share of -2 um, the other in metres; K goes with it, a against it."""
+    size, u = -2e-6, 1e-9
+    number = Certified(size, u, "m", "rectangular", "C")
+    share, count = (
+        Influence("encoders/x/pitch", "", x, unit, "B", "rectangular") for x, unit in ((u / 2e-6, "1"), (u, "m"))
+    )
+    setup = Setup("0" * 64, "", {}, {}, {"encoders/x/pitch": number})
+    made = [(D1, {"K": Estimate(70.0, "N/A", {share: 70.0})}), (D2, {"a": Estimate(3.0, "N/A", {count: -3.0 / size})})]
+    sources = [Source(dataclasses.replace(record(run, values), setup=setup), {}, {}) for run, values in made]
+    assert correlations_of(sources).matrix[0][1] == pytest.approx(-1.0)
+    unsaid = [Source(record(run, values), {}, {}) for run, values in made]
+    assert correlations_of(unsaid).matrix[0][1] == 0.0
 
 
 def test_a_constant_of_two_degrees_of_freedom_has_its_interval_alone() -> None:

@@ -10,8 +10,10 @@ from bench.calibration.calibration import (
     certificates_of,
     changed_certificates,
     number,
+    of_a_day,
     of_the_rig,
     settings_differ,
+    stands,
 )
 
 __all__ = [
@@ -24,6 +26,8 @@ __all__ = [
     "certificates_of",
     "changed_certificates",
     "number",
+    "of_a_day",
     "of_the_rig",
     "settings_differ",
+    "stands",
 ]

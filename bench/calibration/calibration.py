@@ -17,15 +17,22 @@ from typing import Any, ClassVar, Literal
 from pydantic import ConfigDict
 
 from bench.rigfile import RigFile
+from bench.rigfile.certificates import certified_numbers
 from bench.rigfile.toleranced import Toleranced
 from bench.schema import STRICT
 from bench.uncertainty import Estimate, Influence
+from bench.uncertainty.forms import Number, by_numbers, form
 
 Backend = Literal["sim", "live", "served"]  # served: a live link with a simulated controller behind it
 State = Literal["current", "expired"]
 CLOCKS_DIFFER = timedelta(minutes=1)  # at most: the clock of the run's host, and of the one that uses it
 RIG_TABLES = ("site", "geometry", "masses", "sensors", "machine", "hook")
-"""First parts of the identities of influences that stand in the rig file."""
+"""First parts of the identities of influences that stand in the rig file, whatever else is known of it."""
+OF_A_DAY = frozenset({"site/air_density"})
+"""Numbers of the rig file that state a range for every day, within which each has its own."""
+WANDERS = (
+    "drift"  # last part of the identity of a number that states how fast a zero may wander: another way in each run
+)
 
 
 @dataclass(frozen=True)
@@ -132,25 +139,44 @@ class Calibration:
 
 
 def of_the_rig(identity: str) -> bool:
-    """Whether an influence stands in the rig file, so that it is the same in every run."""
+    """Whether an influence is of a table of the rig file, so that it is the same in every run."""
     return identity.partition("/")[0] in RIG_TABLES
 
 
-def adopted(values: Mapping[str, Estimate], run_id: str, known: Collection[str] = ()) -> dict[str, Estimate]:
+def stands(influence: Influence, numbers: Mapping[str, Number]) -> bool:
+    """Whether an influence is one of the rig file's `numbers`, by identity, whole and in whatever form, and the same in every
+    run. What a run makes of a number (a part of its error, a bound where it is exact) is that run's own."""
+    number = numbers.get(influence.id)
+    return number is not None and not of_a_day(influence.id) and form(influence, number) is not None
+
+
+def of_a_day(identity: str) -> bool:
+    """Whether a number of the rig file is another one in every run, though it is stated once."""
+    return identity in OF_A_DAY or identity.rpartition("/")[2] == WANDERS
+
+
+def adopted(
+    values: Mapping[str, Estimate],
+    run_id: str,
+    known: Collection[str] = (),
+    numbers: Mapping[str, Number] | None = None,
+) -> dict[str, Estimate]:
     """Values as facts: influences of this run alone get the identity `<run_id>/...` and say in their name whose they are.
 
-    `known` are the identities that came with the calibrations that the run used: they keep theirs. A value that is not linear
-    in its influences is kept with its linear part.
+    `known` are the identities that came with the calibrations that the run used: they keep theirs, and so do the `numbers` of
+    the rig file, each in its own unit. A value that is not linear in its influences is kept with its linear part.
     """
+    numbers = numbers or {}
 
     def renamed(influence: Influence) -> Influence:
-        if of_the_rig(influence.id) or influence.id in known:
+        if of_the_rig(influence.id) or influence.id in known or stands(influence, numbers):
             return influence
         return dataclasses.replace(influence, id=f"{run_id}/{influence.id}", name=f"{influence.name} [{run_id}]")
 
+    told = {name: by_numbers(e, numbers) for name, e in values.items()}
     return {
         name: Estimate(e.value, e.unit, {renamed(i): c for i, c in e.sensitivities.items() if c * i.u != 0})
-        for name, e in values.items()
+        for name, e in told.items()
     }
 
 
@@ -169,6 +195,8 @@ def certificate(rig: RigFile, identity: str) -> Certificate | None:
         found = getattr(rig.sensors.get(name), part, None)
     elif table in ("geometry", "masses", "machine"):
         found = (getattr(rig, table, None) or {}).get(name)
+    else:
+        found = certified_numbers(rig).get(identity)
     if not isinstance(found, Toleranced):
         return None
     return Certificate(found.value, found.standard_uncertainty, found.unit, found.distribution, found.source)

@@ -17,6 +17,7 @@ from pydantic import ConfigDict, TypeAdapter
 
 from bench.calibration import of_the_rig
 from bench.campaign.file import Equation
+from bench.record.forms import certified_in, in_units, is_number
 from bench.record.records import Measurement, Record
 from bench.rigfile.toleranced import Toleranced
 from bench.rundir import NAME
@@ -181,17 +182,23 @@ def correlations_of(sources: Sequence[Source]) -> Matrix:
     """Correlations of all constants along the chain, from the influences that their budgets share."""
     parts: dict[str, dict[str, float]] = {}
     for source in sources:
-        for m in source.record.measurements:
+        for m in in_units(source.record).measurements:
             if m.value is not None:
-                parts[label(m)] = {identity(e.influence, source.record): e.linear for e in m.budget}
+                parts[label(m)] = _parts(m, source.record)
     names = tuple(parts)
     matrix = tuple(tuple(_coefficient(parts[a], parts[b]) if a != b else 1.0 for b in names) for a in names)
     return Matrix(names, matrix)
 
 
+def _parts(m: Measurement, record: Record) -> dict[str, float]:
+    """Signed contributions to a constant by identity beyond its run; the rig file's numbers keep theirs, in whatever form."""
+    certified = certified_in(record)
+    return {e.influence if is_number(e, certified) else identity(e.influence, record): e.linear for e in m.budget}
+
+
 def identity(influence: str, record: Record) -> str:
-    """An influence's identity beyond its run: the rule of `bench.calibration.adopted`. One that came with a calibration
-    has its own run's name in front already."""
+    """An influence's identity beyond its run, of what is no whole number of the rig file: the rule of
+    `bench.calibration.adopted`. One that came with a calibration has its own run's name in front already."""
     if of_the_rig(influence) or NAME.fullmatch(influence.partition("/")[0]):
         return influence
     return f"{record.run_id}/{influence}"

@@ -17,9 +17,11 @@ from typing import Literal
 from bench.errors import BenchError, ConfigError
 from bench.history.cautions import cautions
 from bench.history.shared import Identities, as_one, identities, linear, renamed
+from bench.record.forms import certified_in, in_units
 from bench.record.records import Measurement, Record
 from bench.rigfile.aliases import in_full
 from bench.uncertainty import Estimate, Influence, budget, interval
+from bench.uncertainty.forms import by_numbers
 from bench.uncertainty.maineffects import drawn_over_u
 
 Key = str
@@ -121,12 +123,13 @@ def compare(a: Side, b: Side, anew: Anew | None = None) -> Comparison:
         ConfigError: the runs cannot be compared.
     """
     _refuse(a, b)
-    ours, theirs = _measured(a.record, b.record), _measured(b.record, a.record)
+    one, other = in_units(a.record), in_units(b.record)
+    ours, theirs = _measured(one, other), _measured(other, one)
     both = [key for key in ours if key in theirs and ours[key].unit == theirs[key].unit]
     if not both:
         raise ConfigError(f"{a.path} and {b.path}: found no quantity that both have measured; expected one at least. "
                           f"Next: `bench runs --procedure {a.record.procedure}` lists others")  # fmt: skip
-    of = identities(a.record, b.record)
+    of = identities(one, other)
     again = _anew(a, b, of, anew) if any(bent(ours[k]) or bent(theirs[k]) for k in both) else {}
     found = tuple(_difference(ours[k], theirs[k], a.record.run_id, b.record.run_id, of, again) for k in both)
     only = tuple(k for k in (*ours, *theirs) if k not in both)
@@ -187,7 +190,8 @@ def _anew(a: Side, b: Side, of: Identities, anew: Anew | None) -> dict[str, Foun
             return known.setdefault(key, replace(i, id=key))
 
         try:
-            out[run_id] = {key: renamed(e, rename) for key, e in anew(side.path).items()}
+            found, certified = anew(side.path), certified_in(side.record)
+            out[run_id] = {key: renamed(by_numbers(e, certified), rename) for key, e in found.items()}
         except BenchError:
             return {}
     return out

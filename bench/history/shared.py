@@ -12,18 +12,14 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from bench.calibration import of_the_rig
+from bench.calibration import of_a_day, of_the_rig
 from bench.findings import SIMULATED_CONTROLLER
+from bench.record.forms import influence_of, uncertainty_of
 from bench.record.records import BudgetEntry, Measurement, Record
 from bench.rundir import NAME
 from bench.uncertainty import Estimate, Influence
 from bench.uncertainty.estimate import Array, Deviations
 
-OF_A_DAY = frozenset({"site/air_density"})
-"""Numbers of the rig file that state a range for every day, within which each has its own."""
-WANDERS = (
-    "drift"  # last part of the identity of a number that states how fast a zero may wander: another way in each run
-)
 SAME = 1e-9  # of a standard uncertainty: rounding of a quotient
 
 
@@ -43,17 +39,12 @@ class Identities:
 
 
 def identities(a: Record, b: Record) -> Identities:
-    """Of two runs, by what their records say."""
+    """Of two runs, by what their records say, `in_units`."""
     ours, theirs = _entries(a), _entries(b)
     one_machine = same_machine(a, b)
     both = (i for i in ours.keys() & theirs.keys() if not of_a_day(i) and _stands(a, ours[i]) and _stands(b, theirs[i]))
     standing = frozenset(i for i in both if _alike(ours[i], theirs[i]) and _one_thing(i, a, b, one_machine))
     return Identities(standing, one_machine)
-
-
-def of_a_day(influence: str) -> bool:
-    """Whether a number of the rig file is another one in every run, though it is stated once."""
-    return influence in OF_A_DAY or influence.rpartition("/")[2] == WANDERS
 
 
 def same_machine(a: Record, b: Record) -> bool:
@@ -97,13 +88,6 @@ def _one_thing(influence: str, a: Record, b: Record, one_machine: bool) -> bool:
     return bool(one.certificate) and one == other and not virtual
 
 
-def uncertainty_of(entry: BudgetEntry) -> float:
-    """Of the influence, in its unit; records of before 2026-11-23 have only what it contributes."""
-    if entry.standard_uncertainty is not None:
-        return entry.standard_uncertainty
-    return entry.contribution / abs(entry.sensitivity) if entry.sensitivity else 0.0
-
-
 def linear(m: Measurement, run_id: str, of: Identities, known: dict[str, Influence]) -> Estimate:
     """A measured quantity of a record as an estimate, by its budget: its linear model.
 
@@ -117,8 +101,7 @@ def linear(m: Measurement, run_id: str, of: Identities, known: dict[str, Influen
         if u * e.sensitivity == 0:
             continue
         key = of.of(e.influence, run_id)
-        dof = math.inf if e.dof is None else e.dof
-        one = known.setdefault(key, Influence(key, e.name, u, e.unit, e.type, e.distribution, dof))  # type: ignore[arg-type]
+        one = known.setdefault(key, replace(influence_of(e), id=key))
         sensitivities[one] = sensitivities.get(one, 0.0) + e.sensitivity * (u / one.u)
     return Estimate(m.value, m.unit, sensitivities)
 

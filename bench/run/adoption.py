@@ -22,6 +22,7 @@ from bench.procedure import Procedure
 from bench.record.records import Record, read_record
 from bench.recording import Recording
 from bench.rigfile import RigFile
+from bench.rigfile.certificates import certified_numbers
 from bench.run.agreement import outcome_of_both, require_agreement
 from bench.run.evaluation import Ending
 from bench.run.reanalysis import reanalysed
@@ -49,7 +50,7 @@ def calibration_of(
     declared = (*procedure.on(rig).measures, *procedure.measures)
     units = {q.name: q.unit for q in declared}  # propagation through a function leaves them empty
     named = {name: replace(e, unit=e.unit or units.get(name.partition("@")[0], "")) for name, e in facts.items()}
-    values = adopted(named, run_id, known)
+    values = adopted(named, run_id, known, certified_numbers(rig))
     identities = {i.id for e in values.values() for i in e.sensitivities}
     date = began.astimezone(UTC)
     return Calibration(

@@ -10,13 +10,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench.rigfile import RigFile
+from bench.rigfile.toleranced import Toleranced
 from bench.uncertainty import Estimate, Influence
 from procedures.inductance_map import fit
 from procedures.inductance_map.fit import Found, Known
 from procedures.inductance_map.model import MAP, PHASES, Rows, Terms
 from procedures.inductance_map.pulses import Array
 from procedures.inductance_map.steps import Taken, rows
-from procedures.shared.certificates import certified_gain
+from procedures.shared.certificates import certified, certified_gain
 from procedures.shared.joint import parts
 from procedures.stages.map_model import present
 from procedures.stages.stators import Phase, axis, phases
@@ -24,6 +25,7 @@ from procedures.stages.stators import Phase, axis, phases
 UNITS = {"slope": "H/m", "length": "m", "overlap": "m", "fringe": "m", "zero": "rad", "centre": "m", "give": "rad/(N m)",
          "give_x": "m/N", "leakage": "H", "saturation": "A", "resistance": "Ohm",
          "current_zero": "A"}  # fmt: skip
+EXACT = 1e-9  # u of a term whose number is exact, for the fit
 COUNT = 1 / math.sqrt(12)  # standard uncertainty of a reading within its count
 FIRST = {"slope": 0.8, "unaligned": 0.15, "c2": 0.03, "c3": 0.09, "length": 0.028, "overlap": 0.014, "fringe": 1.5e-3}
 """Where the fit begins if the controller has no map."""
@@ -64,20 +66,36 @@ def certificates(of: Rows, rig: RigFile, some: Sequence[Phase]) -> list[Known]:
             ("offset_down", i, f"sensors/{phase.current}/offset/down"),
             ("offset_u", u, f"sensors/{phase.voltage}/offset"),
         ):
-            out.append(Known(at.each(name).start + k, stated.value, max(stated.standard_uncertainty, 1e-9), identity))
+            one = None if name == "offset_down" else _of(identity, stated)
+            out.append(
+                Known(at.each(name).start + k, stated.value, max(stated.standard_uncertainty, EXACT), identity, one)
+            )
     x, angle = axis(rig, "stroke"), axis(rig, "angle")
     assert x is not None
     assert angle is not None
     assert x.pitch is not None
     assert angle.pitch is not None
-    wide = 1e-9 if angle.error is None else angle.error.standard_uncertainty / math.sqrt(2)  # of each part of a sine
+    wide = EXACT if angle.error is None else angle.error.standard_uncertainty / math.sqrt(2)  # of each part of a sine
     for k, part in enumerate(("cosine", "sine")):
         out.append(Known(at.once.start + k, 0.0, wide, f"encoders/{angle.name}/error/{part}"))
     for name, where, count in (("off", angle.name, angle.pitch.value), ("along", x.name, x.pitch.value)):
         first = getattr(at, name).start
         out += [Known(first + p, 0.0, COUNT * count, f"counts/{where}/{p}") for p in range(at.places)]
-    share = x.pitch.standard_uncertainty / x.pitch.value
-    return [*out, Known(at.scale, 1.0, max(share, 1e-9), f"encoders/{x.name}/pitch")]
+    share, pitch = x.pitch.standard_uncertainty / x.pitch.value, f"encoders/{x.name}/pitch"
+    one = _of(pitch, x.pitch)
+    return [
+        *out,
+        Known(at.scale, 1.0, max(share, EXACT), pitch, one, 1.0 if one is None else x.pitch.value),
+    ]
+
+
+def _of(identity: str, stated: Toleranced) -> Influence | None:
+    """The influence of a number as the rig file states it; None of one that is exact."""
+    return next((i for i in certified(identity, stated, _called(identity)).sensitivities if i.u > 0), None)
+
+
+def _called(identity: str) -> str:
+    return identity.replace("/", " ")
 
 
 def estimates(found: Found, known: Sequence[Known], of: Rows, rig: RigFile, some: Sequence[Phase],
@@ -147,8 +165,11 @@ def _terms(found: Found, known: Sequence[Known], of: Rows) -> list[Estimate]:
     for j, one in enumerate(known):
         if counts[j]:
             continue
-        influence = Influence(one.identity, one.identity.replace("/", " "), one.u, "1", "B", "rectangular")
-        out = [e + Estimate(0.0, "", {influence: float(s)}) for e, s in zip(out, found.gains[:count, j], strict=True)]
+        influence = one.influence
+        if influence is None:
+            influence = Influence(one.identity, _called(one.identity), one.u, "1", "B", "rectangular")
+        does = found.gains[:count, j] / one.per
+        out = [e + Estimate(0.0, "", {influence: float(s)}) for e, s in zip(out, does, strict=True)]
     scatter = parts(found.scatter[:count, :count], "scatter/pulses", "scatter of the pulses", "A", _freedom(of))
     counted = parts(rounding, "counts/encoders", "counts of the encoders", "B", math.inf)
     return [e + s + c for e, s, c in zip(out, scatter, counted, strict=True)]

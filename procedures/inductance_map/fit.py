@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.errors import AnalysisError
+from bench.uncertainty import Influence
 from procedures.inductance_map.model import MAP, PHASES, Array, Rows, Terms, flux, inductance, places
 from procedures.shared.leastsquares import nonlinear
 
@@ -25,12 +26,15 @@ TIED = 1e-6  # of the mean of the gains
 
 @dataclass(frozen=True)
 class Known:
-    """Of a term (its number): what a certificate says of it, and what a budget calls that."""
+    """Of a term (its number): what a certificate says of it, and what a budget calls that. `influence` is that of the number
+    itself, where it is uncertain; of a term that is a share of the number it moves it by one `per`."""
 
     term: int
     value: float
     u: float
     identity: str
+    influence: Influence | None = None
+    per: float = 1.0
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from procedures.load_response.fit import Array, Pairs, Slope
 from procedures.load_response.plan import Plan
 from procedures.load_response.sequence import Put, changes, chosen, count, lead, masses, order
 from procedures.load_response.steps import Change, Rest
+from procedures.shared.certificates import share_of
 from procedures.stages.known_loads import force, load_inputs, rubbing, sources
 
 Found = dict[tuple[str, str], Estimate]
@@ -220,9 +221,7 @@ def _encoder(s: Static, rig: RigFile) -> Estimate:
     encoder = rig.encoders[name]
     if encoder.pitch is not None and s.axis.pitch is not None and s.axis.pitch.standard_uncertainty > 0:
         term = term_of(rig, encoder.pitch, name, "pitch")
-        u = term.number.standard_uncertainty / abs(term.number.value)
-        out = out * Estimate.of(1.0, Influence(term.identity, f"scale of encoder {name}", u, "1", "B", term.number.distribution,
-                                               source=term.number.source))  # fmt: skip
+        out = out * share_of(term.identity, term.number, f"scale of encoder {name}")
     if encoder.error is not None and s.axis.error is not None:
         term = term_of(rig, encoder.error, name, "error")
         wide = math.sqrt(3) * term.number.standard_uncertainty

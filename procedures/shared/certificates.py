@@ -31,6 +31,12 @@ def certified(identity: str, t: Toleranced, name: str = "") -> Estimate:
     return Estimate.of(t.value, influence)
 
 
+def share_of(identity: str, t: Toleranced, name: str = "") -> Estimate:
+    """1 with how far the certified number may be off, as a share of it: by the same influence as `certified` has, in the
+    number's own unit, so that a scale and a length by it meet as one."""
+    return Estimate(1.0, "1", {i: 1 / t.value for i in certified(identity, t, name).sensitivities if i.u > 0})
+
+
 def certified_gain(rig: RigFile, channel: str) -> Estimate:
     """Gain of a channel's sensor."""
     return certified(f"sensors/{channel}/gain", rig.sensors[channel].gain, f"gain of {channel}")

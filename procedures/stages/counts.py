@@ -17,6 +17,7 @@ import numpy.typing as npt
 from bench.rigfile import RigFile
 from bench.rigfile.stage import StageAxis, axes_of
 from bench.uncertainty import Estimate, Influence
+from procedures.shared.certificates import share_of
 
 Array = npt.NDArray[np.float64]
 BOUND = 1.959964  # U over u: half a count is U
@@ -80,10 +81,8 @@ def erred(axis: StageAxis, place: str) -> Estimate:
 def stretched(axis: StageAxis, by: float) -> Estimate:
     """A zero with what the tolerance of the pitch does over a way."""
     assert axis.pitch is not None
-    share = axis.pitch.standard_uncertainty / axis.pitch.value
-    pitch = Influence(f"encoders/{axis.name}/pitch", "pitch of the encoder", share, "1", "B",
-                      axis.pitch.distribution, source=axis.pitch.source)  # fmt: skip
-    return Estimate(0.0, axis.unit, {pitch: by}) if share > 0 else Estimate.exact(0.0, axis.unit)
+    scale = share_of(f"encoders/{axis.name}/pitch", axis.pitch, "pitch of the encoder")
+    return Estimate(0.0, axis.unit, {i: by * c for i, c in scale.sensitivities.items()})
 
 
 def averaged(values: Sequence[float] | Array) -> float:

@@ -228,7 +228,7 @@ def _parted(
     for j, one in enumerate(known):
         if counts[j] or one.identity not in keep:
             continue
-        stated = one.u * one.per
+        stated = one.stated or one.u * abs(one.per)
         influence = Influence(one.identity, _called(one.identity), stated, one.unit, "B", one.distribution)
         out = [e + Estimate(0.0, "", {influence: float(s) / one.per}) for e, s in zip(out, gains[:, j], strict=True)]
     freedom = float(max(len(of.x) * PHASES - len(MAP) - PHASES, 1))

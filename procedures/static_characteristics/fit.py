@@ -25,7 +25,7 @@ KNOWING = 0.98  # of a certificate's u: where data leave more of it, they say no
 @dataclass(frozen=True)
 class Known:
     """Of a term (its number): what a certificate says of it, and what a budget calls that. A term that is a share of what the
-    certificate states counts `per`, in `unit`: a budget has the certificate's own u."""
+    certificate states counts `per`, in `unit`: a budget has the certificate's own u, `stated`, where that is not 0."""
 
     term: int
     value: float
@@ -34,6 +34,7 @@ class Known:
     distribution: Distribution = "rectangular"
     unit: str = "1"
     per: float = 1.0
+    stated: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -44,8 +44,10 @@ def _of_cells(at: Terms, rig: RigFile, both: tuple[Cell, Cell]) -> Iterator[Know
 def _share(term: int, stated: Toleranced, identity: str, of: float | None = None) -> Known:
     """A term that is a number over what it is stated as, or over `of`."""
     per = stated.value if of is None else of
-    u = max(stated.standard_uncertainty / per, EXACT)
-    return Known(term, stated.value / per, u, identity, stated.distribution, stated.unit, per)
+    u = max(stated.standard_uncertainty / abs(per), EXACT)
+    return Known(
+        term, stated.value / per, u, identity, stated.distribution, stated.unit, per, stated.standard_uncertainty
+    )
 
 
 def _of_currents(at: Terms, rig: RigFile, some: Sequence[Phase]) -> Iterator[Known]:

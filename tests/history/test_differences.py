@@ -14,6 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bench.calibration import adopted
 from bench.errors import AnalysisError, ConfigError
 from bench.findings import SIMULATED_CONTROLLER, Finding
 from bench.history.compare import Comparison, Difference, Side, bent, compare
@@ -22,6 +23,7 @@ from bench.quantity import Quantity
 from bench.record.outcomes import Outcome
 from bench.record.records import Record, findings_of, measurement, unfinished
 from bench.record.setup import Certified, Setup
+from bench.rigfile.toleranced import Toleranced
 from bench.uncertainty import Estimate, Influence
 
 K = Quantity("K_i", "N/A", "force constant")
@@ -37,10 +39,13 @@ def value(middle: float, parts: Mapping[Influence, float]) -> Estimate:
     return Estimate(middle, "N/A", dict(parts))
 
 
-def record(run_id: str, estimate: Estimate, **other: Any) -> Record:
-    """A finished run that measured K_i; every influence of a sensor, a mass or the site stands in its rig file."""
+def record(run_id: str, estimate: Estimate, numbers: Mapping[str, Toleranced] | None = None, **other: Any) -> Record:
+    """A finished run that measured K_i; every influence of a sensor, a mass or the site stands in its rig file, beside
+    `numbers` of it."""
     certified = {i.id: Certified(1.0, i.u, i.unit, i.distribution, "SIM-1") for i in estimate.sensitivities
                  if i.id.partition("/")[0] in ("sensors", "masses", "site", "capabilities")}  # fmt: skip
+    for key, n in (numbers or {}).items():
+        certified[key] = Certified(n.value, n.standard_uncertainty, n.unit, n.distribution, "SIM-1")
     start = unfinished(
         run_id=run_id, procedure="amb-calibration", rig="stand", uut={"model": "stand", "serial": "001"}, started="2026-01-01",
         seed=None, plan={}, versions={}, setup=Setup("ab" * 32, "", {}, {"K_i": "K@inboard"}, certified),
@@ -55,6 +60,34 @@ def compared(a: Record, b: Record) -> Comparison:
 
 def difference(a: Record, b: Record) -> Difference:
     return compared(a, b).differences[0]
+
+
+PITCH = Toleranced(value=2e-6, unit="m", u=3e-9, distribution="normal", source="C")
+SCALE = Influence("encoders/x/pitch", "scale", PITCH.standard_uncertainty / 2e-6, "1", "B", "normal")
+COUNT = Influence("encoders/x/pitch", "pitch", PITCH.standard_uncertainty, "m", "B", "normal")
+
+
+def test_a_scale_that_came_with_a_calibration_is_the_scale_that_the_other_run_reads() -> None:
+    """The second run rests on an adopted value of the same encoder: one scale, which drops out of the difference."""
+    numbers = {SCALE.id: PITCH}
+    fact = adopted({"K": value(75.0, {SCALE: 75.0})}, A, (), numbers)["K"]
+    found = difference(record(A, value(75.0, {SCALE: 75.0, scatter(0.02): 1.0}), numbers),
+                       record(B, fact + value(0.1, {scatter(0.02): 1.0}), numbers))  # fmt: skip
+    assert found.u == pytest.approx(math.hypot(0.02, 0.02))
+    assert found.removed == pytest.approx(1 - 0.02**2 / (0.02**2 + (75 * SCALE.u) ** 2))
+
+
+@pytest.mark.parametrize("size", [2e-6, -2e-6])
+def test_a_record_that_has_a_number_as_a_share_shares_it_with_one_that_has_it_in_its_unit(size: float) -> None:
+    """By hand: K goes with the pitch, K = 75 p/p_0, so that a share of it does 75 and a metre 75/p_0, of whatever sign; nothing
+    is left of it. Where the other run goes against it, K = 75 p_0/p, both add up."""
+    numbers = {SCALE.id: PITCH.model_copy(update={"value": size})}
+    before = record(A, value(75.0, {SCALE: 75.0, scatter(0.02): 1.0}), numbers)
+    left = difference(before, record(B, value(75.1, {COUNT: 75.0 / size, scatter(0.02): 1.0}), numbers))
+    assert left.u == pytest.approx(math.hypot(0.02, 0.02))
+    both = difference(before, record(B, value(75.1, {COUNT: -75.0 / size, scatter(0.02): 1.0}), numbers))
+    assert both.u == pytest.approx(math.hypot(0.02, 0.02, 2 * 75 * SCALE.u))
+    assert next((p.influence, p.shared) for p in both.parts) == (SCALE.id, True)
 
 
 def test_what_both_share_drops_out_as_gtc_has_it() -> None:

@@ -20,10 +20,13 @@ from bench.procedure import Measured
 from bench.rigfile import load_rig
 from bench.rigfile.certificates import certified_numbers
 from bench.rigfile.check_load_cells import problems_of
+from bench.rigfile.toleranced import Toleranced
 from bench.uncertainty import Estimate, interval
+from procedures.shared.certificates import share_of
 from procedures.static_characteristics import checks, estimates, fit
 from procedures.static_characteristics.beside import by_flux, of_controller
 from procedures.static_characteristics.estimates import Result
+from procedures.static_characteristics.known import _share
 from procedures.static_characteristics.model import MAP, Terms
 from procedures.static_characteristics.plan import Plan
 from procedures.static_characteristics.procedure import check, procedure
@@ -179,6 +182,16 @@ def test_the_other_map_stands_beside(sound: tuple[dict[str, Finding], Result]) -
     assert told_by["force_ratio", ""].value == pytest.approx(1.02, rel=1e-9)
     assert told_by["torque_ratio", ""].value == pytest.approx(1.02, rel=1e-9)
     assert 1e-3 < told_by["force_ratio", ""].u < 5e-3
+    pitch = RIG.encoders["x"].pitch
+    assert isinstance(pitch, Toleranced)
+    scale = share_of(
+        "encoders/x/pitch", pitch
+    )  # by hand: what the map has of the encoder's scale, the ratio has less of
+    other = by_flux(values | {"slope": values["slope"] * scale}, r.phases)
+    assert other is not None
+    also = estimates.beside_of(r.found, r.known, r.rows, other)["force_ratio", ""]
+    before, after = (e.contributions["encoders/x/pitch"] for e in (told_by["force_ratio", ""], also))
+    assert after == pytest.approx(before - 1.02 * scale.u, rel=1e-3)
     assert by_flux({}, r.phases) is None
 
 
@@ -203,6 +216,9 @@ def test_the_whole_path(tmp_path: Path) -> None:
         "held_angle",
     }
     assert len(off) == 36
+    one, other = (next(r.estimate for r in done.results if isinstance(r, Measured) and r.quantity.name == name).contributions
+                  for name in ("static_slope", "force_ratio"))  # fmt: skip
+    assert {i for i in {*flux.influences, *one, *other} if i.endswith("encoders/x/pitch")} == {"encoders/x/pitch"}
     assert sum(abs(v) > 1 for v in off.values()) <= 5, off
     assert max(map(abs, off.values())) < 2, off
     ratio = next(r.estimate for r in done.results if isinstance(r, Measured) and r.quantity.name == "force_ratio")
@@ -211,6 +227,16 @@ def test_the_whole_path(tmp_path: Path) -> None:
         "torque",
         "force",
     ]
+
+
+def test_a_cell_that_reads_the_other_way_is_as_uncertain() -> None:
+    """The share of a gain of either sign, and its derivative by the gain's own unit."""
+    for size in (1.01, -1.01):
+        number = Toleranced(value=size, unit="1", half_width=0.01, distribution="rectangular", source="C")
+        one = _share(0, number, "capabilities/load_cells/x/gain")
+        assert (one.u, one.stated, one.per) == (pytest.approx(0.01 / 1.01 / 3**0.5), number.standard_uncertainty, size)
+        (i,), (c,) = zip(*share_of(one.identity, number).sensitivities.items(), strict=True)
+        assert (c * i.u, one.stated / one.per) == (pytest.approx(math.copysign(one.u, size)),) * 2
 
 
 def test_refused() -> None:

@@ -14,7 +14,7 @@ from report_samples import HOSTILE, figures
 from bench.errors import BenchError
 from bench.figures import Figure, Series
 from reports import figures as drawing
-from reports.figures import MAX_LINE_POINTS, draw, envelope
+from reports.figures import BARS, MAX_LINE_POINTS, draw, envelope
 
 
 def one(series: Series, **changes: object) -> Figure:
@@ -30,6 +30,19 @@ def test_equal_figures_give_equal_svg_with_ids_of_their_own(figure: Figure) -> N
     assert all(i.startswith(f"{figure.key}-") for i in ids)
     assert set(re.findall(r"url\(#([^)]*)\)", svg)) | set(re.findall(r'href="#([^"]*)"', svg)) <= set(ids)
     assert not re.search(r"\d{4}-\d\d-\d\dT", svg)
+
+
+@pytest.mark.parametrize(("u", "said", "caption"), [
+    (None, "c.", "c."), ([0.0, 0.0], "c.", "c."), ([np.nan, np.nan], "c.", "c."), ([0.0, 0.1], "c.", f"c. {BARS}"),
+    ([0.1, 0.1], "With its 95 % interval.", "With its 95 % interval."), ([0.1, 0.1], "With bars (95 %).", "With bars (95 %)."),
+])  # fmt: skip
+def test_a_caption_says_what_error_bars_are_where_there_are_some(
+    u: list[float] | None, said: str, caption: str
+) -> None:
+    series = Series("", np.arange(2.0), np.arange(2.0), "points", None if u is None else np.array(u))
+    assert draw(one(series, caption=said)).caption == caption
+    above = one(Series("", np.arange(2.0), np.arange(2.0)), caption=said, below=one(series))
+    assert draw(above).caption == caption
 
 
 def test_a_hostile_label_is_a_drawing_and_not_markup() -> None:
