@@ -10,23 +10,20 @@ import threading
 import time
 import tty
 from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from pathlib import Path
 
+import lira_line
 import pytest
 from far_end import until
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bench.cli.opening import LIVE_SLICE_S, beat_of
-from bench.clock import WallClock
 from bench.errors import DeviceFault
-from bench.link.session import new_session
-from bench.rigfile import RigFile, load_rig
+from bench.rigfile import load_rig
 from bench.wire.commandline import with_checksum
 from drivers.controller import Controller
 from drivers.linerate import ANSWER_S, FIRST_TAG, RATE_TAG, SILENT_S, Rate
-from drivers.live_link import LiveLink
-from drivers.wires import open_wire
 from sim_backend.machines.lira.device import RATES, Device
 from sim_backend.machines.lira.uart import Uart
 from sim_backend.truth import draw
@@ -95,21 +92,11 @@ def line() -> Iterator[Line]:
     one.close()
 
 
-@contextlib.contextmanager
-def connected(where: str) -> Iterator[Controller]:
+def connected(where: str) -> AbstractContextManager[Controller]:
     """A bench on it, patient with a test machine that gives it no time."""
     text = (Path(__file__).parents[2] / "rigs/lira.toml").read_text()
-    text = re.sub(r'url = "cli:.*"', f'url = "cli:serial:{where}?baudrate={FAST}"', text)
     text = re.sub(r"(watchdog_s = .*?default = )[0-9.]+(, .*?high = )[0-9.]+", r"\g<1>5\g<2>5", text)
-    rig = RigFile.parse(text, load_rig("lira").dbc_text)
-    wall, session = WallClock(), new_session()
-    link = LiveLink(
-        "controller", lambda: open_wire(rig.link, "controller", (), wall.now_ns, rig), beat_of(rig, session)
-    )
-    with contextlib.closing(link):
-        controller = Controller(rig, link, wall, session, LIVE_SLICE_S)
-        controller.connect()
-        yield controller
+    return lira_line.connected(text, f"cli:serial:{where}?baudrate={FAST}")
 
 
 def test_a_brown_out_is_found_again_and_told(line: Line) -> None:

@@ -2,28 +2,23 @@
 
 from __future__ import annotations
 
-import contextlib
 import re
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 
+import lira_line
 import numpy as np
 import processes
 import pytest
 
-from bench.cli.opening import LIVE_SLICE_S, beat_of
-from bench.clock import WallClock
 from bench.link.codec import Decoder
-from bench.link.session import new_session
 from bench.rigfile import RigFile, load_rig
 from drivers.controller import Controller
-from drivers.live_link import LiveLink
 from drivers.reception import open_reception
-from drivers.wires import open_wire
 
 PORTS = ("--link", "controller=cli:socket://127.0.0.1:0", "--link", "operator=line:127.0.0.1:0")
 KINDS = ("cli:socket", "cli:pty")
@@ -32,18 +27,8 @@ LEVITATED = 4  # as the firmware numbers its states
 FAULTS = ("--fault", "corrupt=0.01", "--fault", "drop=0.01")
 
 
-@contextmanager
-def connected(folder: Path, url: str) -> Iterator[Controller]:
-    text = (folder / "rigs/lira.toml").read_text()
-    rig = RigFile.parse(re.sub(r'url = "cli:.*"', f'url = "{url}"', text), load_rig("lira").dbc_text)
-    wall, session = WallClock(), new_session()
-    link = LiveLink(
-        "controller", lambda: open_wire(rig.link, "controller", (), wall.now_ns, rig), beat_of(rig, session)
-    )
-    with contextlib.closing(link):
-        controller = Controller(rig, link, wall, session, LIVE_SLICE_S)
-        controller.connect()
-        yield controller
+def connected(folder: Path, url: str) -> AbstractContextManager[Controller]:
+    return lira_line.connected((folder / "rigs/lira.toml").read_text(), url)
 
 
 @pytest.mark.timeout(240)
