@@ -72,7 +72,7 @@ def rested(identity: str, axis: StageAxis, reads: Sequence[float], entered: Sequ
     they changed last, 1, -1, or 0 where they went on changing or never did, of which the half count is left."""
     ways, pitch = np.asarray(entered), pitch_of(axis)
     mean, spread = BRAKED
-    some = (
+    some: tuple[tuple[npt.NDArray[np.bool_], str, str, float, Distribution], ...] = (
         (ways != 0, "in", "where in its last count it rests", spread * pitch, "rectangular"),
         (ways == 0, "between", "rounding of the reading", pitch / 2 / 2**0.5, "arcsine"),
     )
