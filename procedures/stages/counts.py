@@ -28,11 +28,8 @@ Array = npt.NDArray[np.float64]
 BOUND = 1.959964  # U over u: half a count is U
 RECTANGLE = 3.0**0.5
 ONE = 1e-9  # of a share that is the whole
-BRAKED = (
-    1 / 3,
-    (4 / 45) ** 0.5,
-)  # of its last count, from the edge it came in by to where it rests: mean, standard deviation
-TURNED = 5 / 12, 1 / 12  # likewise to where it turns, on the mean: between 1/3 and 1/2
+BRAKED = 1 / 3, (4 / 45) ** 0.5  # of a count, from the edge it came in by to its rest: mean, standard deviation
+TURNED = 5 / 12, 1 / 12  # likewise to where it turns: the mean, between 1/3 and 1/2
 
 
 def lacks_counts(rig: RigFile) -> tuple[str, ...]:
