@@ -39,10 +39,11 @@ def _traces(r: Result, plan: Plan) -> Figure:
         Series("", t[::every], fine * _extremes(high, every, np.maximum), "faint"),
         Series("", t[::every], fine * r.place.mean(axis=0)[::every]),
     )
-    below = Figure("", "", "", "time / s", f"{r.pair.held.name} - set point / {small}", held, lines=(("", 0.0),))
+    below = Figure("", "", "", "time / s", f"{r.pair.held.name} less its set point / {small}", held, lines=(("", 0.0),))
+    told = small if small == "°" else f" {small}"
     caption = (f"{r.pair.moved.name} follows its sine, {r.pair.held.name} is held: readings over a period, {len(r.place)} "
                f"periods laid on each other; below their mean, in grey their least and greatest, and the set point. The "
-               f"largest excursion is {fine * r.excursion:.3g} {small}.")  # fmt: skip
+               f"largest excursion is {fine * r.excursion:.3g}{told}.")  # fmt: skip
     moved = Series(r.pair.moved.name, t[::every], big * r.moved.mean(axis=0)[::every])
     key = f"traces-{r.pair.held.name}-{r.pair.moved.name}"
     return Figure(key, f"Both axes over a period: {r.pair.where}", caption, "time / s", f"{r.pair.moved.name} / {unit}",
