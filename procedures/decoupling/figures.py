@@ -63,9 +63,10 @@ def _forces(r: Result) -> Figure:
         some = np.flatnonzero(r.cross.on & (way * r.rate > 0))
         order = some[np.argsort(place[some])]
         series.append(Series(name, scale * place[order], force[order]))
-    caption = (f"What {r.pair.moved.name}'s motion puts on {r.pair.held.name}, by the force that its loop asks for against it, "
-               "over the place of the moved axis, in the mean of the periods, where that axis slides; a constant is left "
+    what = "torque" if r.pair.held.unit == "rad" else "force"
+    caption = (f"What {r.pair.moved.name}'s motion puts on {r.pair.held.name}, by the {what} that its loop asks for against "
+               "it, over the place of the moved axis, in the mean of the periods, where that axis slides; a constant is left "
                "out.")  # fmt: skip
     key = f"cross-{r.pair.held.name}-{r.pair.moved.name}"
-    return Figure(key, f"Cross force: {r.pair.where}", caption, f"{r.pair.moved.name} / {unit}",
-                  f"force on {r.pair.held.name} / m{r.pair.held.force}", tuple(series), lines=(("zero", 0.0),))  # fmt: skip
+    return Figure(key, f"Cross {what}: {r.pair.where}", caption, f"{r.pair.moved.name} / {unit}",
+                  f"{what} on {r.pair.held.name} / m{r.pair.held.force}", tuple(series), lines=(("zero", 0.0),))  # fmt: skip
