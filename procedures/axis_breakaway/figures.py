@@ -23,13 +23,12 @@ def all_figures(r: Result) -> Iterator[Figure]:
 def _axis(r: Result, name: str) -> Figure:
     a, axis = r.data.axes[name], r.data.of[name]
     per = 1e3 if axis.unit == "rad" else 1.0
-    unit = "mN m" if axis.unit == "rad" else "N"
+    what, unit = ("torque", "mN m") if axis.unit == "rad" else ("force", "N")
     n = np.arange(1.0, len(a.plus) + 1)
     series = (Series("up", n, per * a.plus, "points"), Series("down", n, -per * a.minus, "points"))
-    caption = ("Force by the controller's map at which it begins to move, repeat by repeat, at other places each; the "
-               "line is the result "
-               "by known loads.")  # fmt: skip
-    return Figure(f"breakaway-{name}", f"Breakaway: {name}", caption, "repeat", f"force by the map / {unit}", series,
+    caption = (f"{what.capitalize()} by the controller's map at which it begins to move, repeat by repeat, at other places "
+               "each; the line is the result by known loads.")  # fmt: skip
+    return Figure(f"breakaway-{name}", f"Breakaway: {name}", caption, "repeat", f"{what} by the map / {unit}", series,
                   lines=(("result", per * r.at[name]),))  # fmt: skip
 
 

@@ -14,15 +14,15 @@ from procedures.stages.spread import turns
 POINTS = 100
 
 
-def all_figures(r: Result) -> Iterator[Figure]:
-    """Each axis, then helices."""
+def all_figures(r: Result, scale: str) -> Iterator[Figure]:
+    """Each axis, then helices; `scale` as the plan has it."""
     for name in r.friction:
-        yield _axis(r, name)
+        yield _axis(r, name, "known loads" if scale == "loads" else "the controller's map")
     if r.data.helix is not None:
         yield _helix(r)
 
 
-def _axis(r: Result, name: str) -> Figure:
+def _axis(r: Result, name: str, by: str) -> Figure:
     f, axis, rate = r.friction[name], r.data.of[name], r.data.axes[name].rate
     around = turns(axis)
     scale, unit = (1.0, "rad/s") if around else (1e3, "mm/s")
@@ -32,7 +32,7 @@ def _axis(r: Result, name: str) -> Figure:
         Series("mean of the repeats", scale * rate, per * f.at, "points"),
         Series("Coulomb and viscous", scale * line, per * (f.coulomb + f.viscous * line)),
     )
-    caption = "Half the difference of both ways at constant rates, by known loads or by the controller's map."
+    caption = f"Half the difference of both ways at constant rates, by {by}."
     return Figure(f"friction-{name}", f"Friction: {name}", caption, f"rate / {unit}", f"friction / {force}", series,
                   lines=(("Coulomb", per * f.coulomb),))  # fmt: skip
 

@@ -79,8 +79,7 @@ def measured(r: Result) -> Iterator[Measured]:
 
 def figures(r: Result, recording: Recording[Plan]) -> Iterable[Figure]:
     """Friction over rates and ratios."""
-    del recording
-    return drawn.all_figures(r)
+    return drawn.all_figures(r, recording.plan.scale)
 
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:

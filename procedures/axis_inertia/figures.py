@@ -29,5 +29,5 @@ def _axis(r: Result, name: str) -> Figure:
     what = "moment of inertia" if around else "mass"
     caption = (f"By the controller's map, repeat by repeat: the map errs from place to place, alike with and without the part. "
                f"The line is the result, of which nothing of the map is left: {scale * m.inertia:.5g} {unit}.")  # fmt: skip
-    return Figure(f"inertia-{name}", f"What {name} moves", caption, "repeat", f"{what} by the map / {unit}", tuple(series),
+    return Figure(f"inertia-{name}", f"What {name} moves", caption, "repeat", f"{what} / {unit}", tuple(series),
                   lines=(("result", scale * m.inertia),))  # fmt: skip

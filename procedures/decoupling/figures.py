@@ -39,10 +39,11 @@ def _traces(r: Result, plan: Plan) -> Figure:
         Series("", t[::every], fine * _extremes(high, every, np.maximum), "faint"),
         Series("", t[::every], fine * r.place.mean(axis=0)[::every]),
     )
-    below = Figure("", "", "", "time / s", f"{r.pair.held.name} - set point / {small}", held, lines=(("", 0.0),))
+    below = Figure("", "", "", "time / s", f"{r.pair.held.name} less its set point / {small}", held, lines=(("", 0.0),))
+    told = small if small == "°" else f" {small}"
     caption = (f"{r.pair.moved.name} follows its sine, {r.pair.held.name} is held: readings over a period, {len(r.place)} "
                f"periods laid on each other; below their mean, in grey their least and greatest, and the set point. The "
-               f"largest excursion is {fine * r.excursion:.3g} {small}.")  # fmt: skip
+               f"largest excursion is {fine * r.excursion:.3g}{told}.")  # fmt: skip
     moved = Series(r.pair.moved.name, t[::every], big * r.moved.mean(axis=0)[::every])
     key = f"traces-{r.pair.held.name}-{r.pair.moved.name}"
     return Figure(key, f"Both axes over a period: {r.pair.where}", caption, "time / s", f"{r.pair.moved.name} / {unit}",
@@ -62,9 +63,10 @@ def _forces(r: Result) -> Figure:
         some = np.flatnonzero(r.cross.on & (way * r.rate > 0))
         order = some[np.argsort(place[some])]
         series.append(Series(name, scale * place[order], force[order]))
-    caption = (f"What {r.pair.moved.name}'s motion puts on {r.pair.held.name}, by the force that its loop asks for against it, "
-               "over the place of the moved axis, in the mean of the periods, where that axis slides; a constant is left "
+    what = "torque" if r.pair.held.unit == "rad" else "force"
+    caption = (f"What {r.pair.moved.name}'s motion puts on {r.pair.held.name}, by the {what} that its loop asks for against "
+               "it, over the place of the moved axis, in the mean of the periods, where that axis slides; a constant is left "
                "out.")  # fmt: skip
     key = f"cross-{r.pair.held.name}-{r.pair.moved.name}"
-    return Figure(key, f"Cross force: {r.pair.where}", caption, f"{r.pair.moved.name} / {unit}",
-                  f"force on {r.pair.held.name} / m{r.pair.held.force}", tuple(series), lines=(("zero", 0.0),))  # fmt: skip
+    return Figure(key, f"Cross {what}: {r.pair.where}", caption, f"{r.pair.moved.name} / {unit}",
+                  f"{what} on {r.pair.held.name} / m{r.pair.held.force}", tuple(series), lines=(("zero", 0.0),))  # fmt: skip

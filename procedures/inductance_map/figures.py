@@ -9,6 +9,7 @@ import numpy as np
 
 from bench.figures import Figure, Series, Sheet, Shown
 from bench.rigfile import RigFile
+from bench.uncertainty import round_to_uncertainty
 from procedures.inductance_map.estimates import Result
 from procedures.inductance_map.model import MAP, angular, flux
 from procedures.inductance_map.residuals import left
@@ -36,11 +37,12 @@ def _inductance(r: Result) -> Figure:
         "Residuals",
         "",
         "angle from the aligned one / °",
-        "beyond the formula / % of aligned",
+        "off the formula / %",
         tuple(beyond),
     )
-    caption = ("Inductance per metre of overlap without saturation, over the phase's gain: pulses and the formula. What turns "
-               "once with the angle is in both.")  # fmt: skip
+    caption = ("Inductance per metre of overlap without saturation, over the phase's gain: pulses and the formula, and beneath "
+               "them what they are off it, share of the aligned one. What turns once with "
+               "the angle is in both.")  # fmt: skip
     return Figure("inductance", "Inductance over the angle", caption, "angle from the aligned one / °", "inductance / (H/m)",
                   (*points, Series("formula", np.degrees(d), curve, "line")), below=below)  # fmt: skip
 
@@ -62,7 +64,7 @@ def _fluxes(r: Result) -> Figure:
             Series("", i, 1e3 * fit[some][order], "faint"),
         ]
     caption = (
-        "Flux of two pulses on their way up and down, by u - R i with R of the pulse's own held end; lines are the fit."
+        "Flux of two pulses on their way up and down, by u − R i with R of the pulse's own held end; lines are the fit."
     )
     return Figure("flux", "Flux over current", caption, "current / A", "flux / mWb", tuple(series))
 
@@ -79,8 +81,7 @@ def _parameters(r: Result, rig: RigFile) -> Sheet:
                 (
                     name,
                     f"{rig.parameters[name].default:.6g}",
-                    f"{estimate.value:.6g}",
-                    f"{2 * estimate.u:.2g}",
+                    *round_to_uncertainty(estimate.value, 2 * estimate.u),
                     estimate.unit,
                 )
             )

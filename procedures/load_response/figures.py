@@ -8,7 +8,7 @@ import numpy as np
 
 from bench.figures import Figure, Series, Sheet, Shown
 from bench.rigfile.stage import StageAxis
-from bench.uncertainty import interval
+from bench.uncertainty import interval, stated
 from procedures.load_response.estimates import BAND, COMPLIANCE, FRICTION, SCALE, Answered, Result, Static, named
 from procedures.load_response.plan import Plan
 from procedures.load_response.steps import Change
@@ -77,7 +77,7 @@ def _row(s: Static, r: Result) -> tuple[str, ...]:
     stiff = 1 / per
 
     def text(value: float, low: float, high: float) -> str:
-        return f"{value:.4g} ± {float(f'{(high - low) / 2:.2g}'):g}"
+        return stated(value, (high - low) / 2, "±")
 
     cells = []
     for e, f in ((per, factor), (stiff, 1.0), (band, factor), (held, 1.0), (scale, 1.0)):

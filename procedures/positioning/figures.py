@@ -63,10 +63,12 @@ def _over_time(r: Result) -> Figure:
 
 def _sheet(r: Result) -> Sheet:
     far, place, near, small = _scales(r)
+    digits = 4 if small == "°" else 2
     t = by_target(r.deviations)
     columns = (*t.mean, *t.s, t.reversal, t.repeatability)
     rows = tuple(
-        (f"{p * far:.6g}", *(f"{c[k] * near:.3g}" for c in columns)) for k, p in enumerate(r.taken.tested.at.tolist())
+        (f"{p * far:.6g}", *(f"{c[k] * near:z.{digits}f}" for c in columns))
+        for k, p in enumerate(r.taken.tested.at.tolist())
     )
     caption = f"By target: place in {place}, all others in {small}."
     header = ("P_i", "mean up", "mean down", "s up", "s down", "B_i", "R_i")

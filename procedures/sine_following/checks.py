@@ -20,7 +20,7 @@ FOLLOWED = 0.5  # of the amplitude
 
 def told(axis: StageAxis, value: float) -> str:
     """A length or an angle for a reader."""
-    return f"{math.degrees(value):.3f}°" if axis.unit == "rad" else f"{value * 1e3:.4f} mm"
+    return f"{math.degrees(value):z.3f}°" if axis.unit == "rad" else f"{value * 1e3:z.4f} mm"
 
 
 def of_rides(rides: Sequence[Ride], rig: RigFile, plan: Plan) -> Iterator[Finding]:

@@ -5,6 +5,12 @@ pushed until its reading changes comes to rest at the edge of a count more often
 is taken for U itself, u = h/1.96: the 95 % of a rectangle, 0.95 h, would leave out just these rests. Against the true place
 there are also the edges, up to half a count off the zero for good, and the encoder's own error, which differs from place to
 place.
+
+Which edge of its last count an axis came in by is told by the way in which its reading changed last. Braked evenly, with a
+speed v there, it goes on by d = v²/2a. All that is known of v is that the axis stayed in the count, so that it is between zero
+and the speed that just reaches the other edge. With all of these alike likely d is s² of a count, s even between 0 and 1: 1/3
+of a count on the mean, with a variance of 1/5 - 1/9 = 4/45. Where an axis turns round that is braked by what knows nothing of
+counts, all places in the count are alike likely, 1/2 on the mean; a loop that knows them brakes, too.
 """
 
 from __future__ import annotations
@@ -16,12 +22,15 @@ import numpy.typing as npt
 
 from bench.rigfile import RigFile
 from bench.rigfile.stage import StageAxis, axes_of
-from bench.uncertainty import Estimate, Influence
+from bench.uncertainty import Distribution, Estimate, Influence
 from procedures.shared.certificates import share_of
 
 Array = npt.NDArray[np.float64]
 BOUND = 1.959964  # U over u: half a count is U
 RECTANGLE = 3.0**0.5
+ONE = 1e-9  # of a share that is the whole
+BRAKED = 1 / 3, (4 / 45) ** 0.5  # of a count, from the edge it came in by to its rest: mean, standard deviation
+TURNED = 5 / 12, 1 / 12  # likewise to where it turns: the mean, between 1/3 and 1/2
 
 
 def lacks_counts(rig: RigFile) -> tuple[str, ...]:
@@ -56,10 +65,50 @@ def rounded(identity: str, axis: StageAxis, by: float) -> Estimate:
     )
 
 
-def rested(identity: str, axis: StageAxis, share: float) -> Estimate:
-    """A zero with a share of the rounding of a rest, for a true place: at the edges of a count rather than in its middle."""
-    u = share * half_count(axis) / 2**0.5
-    return Estimate.of(0.0, Influence(f"rest/{identity}", "where in its count it rests", u, axis.unit, "B", "arcsine"))
+def rested(identity: str, axis: StageAxis, reads: Sequence[float], entered: Sequence[int]) -> Estimate:
+    """Where an axis stands on the mean of rests, m or rad, by its encoder's scale: readings (n,) and the ways (n,) in which
+    they changed last, 1, -1, or 0 where they went on changing or never did, of which the half count is left."""
+    ways, pitch = np.asarray(entered), pitch_of(axis)
+    mean, spread = BRAKED
+    some: tuple[tuple[npt.NDArray[np.bool_], str, str, float, Distribution], ...] = (
+        (ways != 0, "in", "where in its last count it rests", spread * pitch, "rectangular"),
+        (ways == 0, "between", "rounding of the reading", pitch / 2 / 2**0.5, "arcsine"),
+    )
+    place = Estimate.exact(float(np.mean(reads)) - (0.5 - mean) * pitch * float(ways.mean()), axis.unit)
+    for of, key, name, u, shape in some:
+        if of.any():
+            alike = np.column_stack([reads, ways])[of]
+            place += float(of.mean()) * _of_mean(f"rest/{identity}/{key}", name, u, axis.unit, shape, alike)
+    return place
+
+
+def topped(identity: str, axis: StageAxis, tops: Sequence[float], stood: Sequence[bool]) -> Estimate:
+    """How far an axis got on the mean, m or rad, by its greatest readings (n,), and whether it stood there (n,): as any rest
+    does, or else it turned round. Where in its last count it turns on the mean is the same for all that do."""
+    pitch, unit, stays = pitch_of(axis), axis.unit, np.asarray(stood)
+    (rest, spread), (turn, within), rounds = BRAKED, TURNED, float(1 - stays.mean())
+    each = _of_mean(f"top/{identity}", "where in its last count it stops", spread * pitch, unit, "rectangular",
+                    np.column_stack([tops, stays]))  # fmt: skip
+    of_all = Influence(
+        f"turn/{identity}", "where it turns on the mean", within * pitch / RECTANGLE, unit, "B", "rectangular"
+    )
+    value = float(np.mean(tops)) - pitch * (0.5 - rest + rounds * (rest - turn))
+    return each + Estimate(value, unit, {of_all: rounds} if rounds > 0 else {})
+
+
+def bounded(identity: str, axis: StageAxis, reads: Sequence[float], place: Estimate) -> Estimate:
+    """A place by the encoder's scale, m or rad, of which readings (n,) are known: none is farther from its reading than half a
+    count. Where that says more of their mean than what is likely within their last counts, it is stated."""
+    mean, half = float(np.mean(reads)), half_count(axis)
+    return place if abs(place.value - mean) + BOUND * place.u < half else rounded(identity, axis, half) + mean
+
+
+def _of_mean(
+    identity: str, name: str, u: float, unit: str, shape: Distribution, alike: Sequence[float] | Array
+) -> Estimate:
+    """A zero with the mean of what is off by `u` each, alike where `alike` (n,) or (n, m) is: then it is shaped so."""
+    share = averaged(alike)
+    return Estimate.of(0.0, Influence(identity, name, share * u, unit, "B", shape if share > 1 - ONE else "normal"))
 
 
 def edges(axis: StageAxis) -> Estimate:
@@ -86,7 +135,7 @@ def stretched(axis: StageAxis, by: float) -> Estimate:
 
 
 def averaged(values: Sequence[float] | Array) -> float:
-    """What is left of a bound, such as rounding, in the mean of repeats (n,): those that read alike are off alike, those that
-    do not are off each by itself; the root of the sum of squares of the shares that read alike."""
-    _, counts = np.unique(np.round(np.asarray(values, np.float64), 12), return_counts=True)
+    """What is left of a bound, such as rounding, in the mean of repeats (n,) or (n, m): those that read alike are off alike,
+    those that do not are off each by itself; the root of the sum of squares of the shares that read alike."""
+    _, counts = np.unique(np.round(np.asarray(values, np.float64), 12), return_counts=True, axis=0)
     return float(np.sqrt((counts**2).sum()) / counts.sum())

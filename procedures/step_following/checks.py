@@ -23,7 +23,7 @@ ELSEWHERE = 1e-3  # of a step, by which a set point may miss where it was sent
 
 def told(axis: StageAxis, value: float) -> str:
     """A length or an angle for a reader."""
-    return f"{math.degrees(value):.3f}°" if axis.unit == "rad" else f"{value * 1e3:.4f} mm"
+    return f"{math.degrees(value):z.3f}°" if axis.unit == "rad" else f"{value * 1e3:z.4f} mm"
 
 
 def of_moves(moves: Sequence[Move], rig: RigFile, plan: Plan) -> Iterator[Finding]:

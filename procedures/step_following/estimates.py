@@ -13,6 +13,7 @@ from procedures.stages.counts import (
     BOUND,
     RECTANGLE,
     averaged,
+    bounded,
     edges,
     erred,
     half_count,
@@ -20,6 +21,7 @@ from procedures.stages.counts import (
     rested,
     rounded,
     stretched,
+    topped,
 )
 from procedures.stages.tracks import Mode, named, where_of, without
 from procedures.step_following.fit import Stepped, began, stepped
@@ -86,14 +88,14 @@ def _of_group(g: Group, plan: Plan) -> Mapping[tuple[str, str], Estimate]:
     axis, where, way = g.axis, g.where, (1.0 if g.way == UP else -1.0)
     size = abs(step_of(axis, plan, g.way))
     target = places(axis, plan)[g.way == UP]
-    errors, overs = [f.error for f in g.found], [f.overshoot for f in g.found]
-    half, share = half_count(axis), averaged(errors)
+    errors, tops = [f.error for f in g.found], [f.overshoot * size for f in g.found]
+    place = rested(f"{ERROR}/{where}", axis, errors, [f.entered for f in g.found])
     beyond = edges(axis) + erred(axis, f"{target:g}") + stretched(axis, target)
-    over = rounded(f"{OVER}/{where}", axis, half * averaged(overs))
+    over = bounded(f"{OVER}/{where}", axis, tops, topped(f"{OVER}/{where}", axis, tops, [f.stood for f in g.found]))
     out = {
-        (named(ERROR, axis), where): rounded(f"{ERROR}/{where}", axis, half * share) + float(np.mean(errors)),
-        (named(TRUE, axis), where): rested(f"{ERROR}/{where}", axis, share) - way * beyond + float(np.mean(errors)),
-        (OVER, where): Estimate(float(np.mean(overs)), "1", {i: c / size for i, c in over.sensitivities.items()}),
+        (named(ERROR, axis), where): bounded(f"{ERROR}/{where}", axis, errors, place),
+        (named(TRUE, axis), where): place - way * beyond,
+        (OVER, where): Estimate(over.value / size, "1", {i: c / size for i, c in over.sensitivities.items()}),
     }
     if all(f.settled is not None for f in g.found):
         out[TIME, where] = _time(g)

@@ -18,6 +18,7 @@ STANDS = 1.5  # counts, in which a reading that stands may change
 BEFORE, AFTER = 6, 7  # samples about a passing, of which the last outside is the first before
 PASSED = (5, 30)  # counts, fewest and most among them: of fewer it lingers, over more what bends a parabola shows
 NEWTON = 4
+LINGERS = 20  # times as long as in the count before: braked evenly it turns round within 2/(2**0.5 - 1) times
 
 
 class Settled(NamedTuple):
@@ -32,12 +33,15 @@ class Settled(NamedTuple):
 
 @dataclass(frozen=True)
 class Stepped:
-    """Of one step: where it stood beyond the set point, m or rad, and how far it moved while it was to rest; how far it got
-    beyond the set point, share of the step; when it stays in the band, None where it is outside at the end."""
+    """Of one step: where it stood beyond the set point, m or rad, and how far it moved while it was to rest; which way its
+    reading changed last, 1 along the step, -1 back, 0 where it changes at rest; how far it got beyond the set point, share of
+    the step, and whether it stood there; when it stays in the band, None where it is outside at the end."""
 
     error: float
     moved: float
+    entered: int
     overshoot: float
+    stood: bool
     settling: Settled | None
 
     @property
@@ -56,6 +60,22 @@ def stood(rest: Array, pitch: float) -> float:
     """Where an axis stood, by readings (n,)."""
     low, high = float(rest.min()), float(rest.max())
     return (low + high) / 2 if high - low < STANDS * pitch else float(rest.mean())
+
+
+def entered(beyond: Array, rest: int, pitch: float) -> int:
+    """Which way a reading (n,) changed last, 1 or -1; 0 where it never did, or in its last `rest` samples."""
+    changed = np.flatnonzero(np.abs(np.diff(beyond)) > pitch / 2)
+    if not len(changed) or changed[-1] >= len(beyond) - rest:
+        return 0
+    return 1 if beyond[changed[-1] + 1] > beyond[changed[-1]] else -1
+
+
+def lingered(beyond: Array, pitch: float) -> bool:
+    """Whether a reading (n,) stays at its greatest count as what stands does, and not as what turns round there."""
+    top = beyond > beyond.max() - pitch / 2
+    first = int(np.argmax(top))
+    lower = np.flatnonzero(beyond[:first] < beyond.max() - STANDS * pitch)
+    return int(top.sum()) > LINGERS * (first - int(lower[-1])) if len(lower) else False
 
 
 def crossing(t: Array, beyond: Array, band: float) -> tuple[float, float] | None:
@@ -124,4 +144,5 @@ def stepped(
     t, beyond = t[begun:] - t[begun], way * (read[begun:] - target)
     still = beyond[-rest:]
     at = settling(t, beyond, band * size, pitch)
-    return Stepped(stood(still, pitch), float(np.ptp(still)), float(beyond.max()) / size, at)
+    over, stays = float(beyond.max()) / size, lingered(beyond, pitch)
+    return Stepped(stood(still, pitch), float(np.ptp(still)), entered(beyond, rest, pitch), over, stays, at)

@@ -24,7 +24,6 @@ from bench.record.specs import applied, load_spec
 from bench.rigfile import load_rig
 from bench.rigfile.stage import axes_of
 from bench.uncertainty import interval
-from procedures.stages.counts import averaged, own_error
 from procedures.stages.tracks import Mode, Track, modes, requires
 from procedures.step_following import checks
 from procedures.step_following.estimates import grouped, results
@@ -117,19 +116,6 @@ def test_along_the_step_beyond_is_positive() -> None:
     assert settling(t, np.full(3000, 1.0), 0.5, COUNT) is None
 
 
-def test_rounding_is_averaged_as_far_as_readings_differ() -> None:
-    assert averaged([2.0, 2.0, 2.0]) == 1
-    assert averaged([1.0, 2.0, 3.0]) == pytest.approx(1 / math.sqrt(3))
-    assert averaged([1.0, 1.0, 2.0, 2.0]) == pytest.approx(1 / math.sqrt(2))
-
-
-def test_the_encoder_of_the_rig() -> None:
-    """0.08 degrees once a turn; the place along has no error of its own but its pitch."""
-    axes = axes_of(RLSRM)
-    assert own_error(axes["angle"]) == pytest.approx(0.08 * DEG)
-    assert own_error(axes["x"]) == 0
-
-
 def moves(offset: float = 0.0, rest: float = 0.0, lost: int = 0, states: tuple[str, ...] = ("HOLDING",),
           read: bool = True, sent: float = 1.0) -> tuple[list[Move], Plan]:  # fmt: skip
     """Of the axis along, by hand: it follows at once and stands `offset` beyond, moving by `rest` at the end."""
@@ -185,14 +171,26 @@ def test_what_is_told_of_bad_data() -> None:
 
 
 def test_static_error_and_its_budget_by_hand() -> None:
-    """12 um beyond: half a count by the encoder, and its edges and pitch besides against the true place."""
+    """12 um beyond, with readings that rose last: half a count by the encoder; against the true place a sixth of a count nearer
+    to where it came from, within 4/45 of a square count, and the encoder's edges and pitch besides."""
     some, plan = moves(offset=12e-6)
     found = results(grouped(some, plan), plan).estimates
     own, true = found["static_error", "x, up"], found["true_static_error", "x, up"]
-    assert own.value == true.value == pytest.approx(12e-6, abs=1e-12)
+    assert own.value == pytest.approx(12e-6, abs=1e-12)
+    assert true.value == pytest.approx(12e-6 - COUNT / 6, abs=1e-12)
     assert pytest.approx(COUNT / 2, rel=1e-3) == interval(own).U
     scale = 10e-3 * 3e-5 / math.sqrt(3)
-    assert true.u == pytest.approx(math.sqrt((0.5e-6) ** 2 / 2 + (0.5e-6) ** 2 / 3 + scale**2), rel=1e-3)
+    assert true.u == pytest.approx(math.sqrt(4 / 45 * COUNT**2 + (0.5e-6) ** 2 / 3 + scale**2), rel=1e-3)
+
+
+def test_of_rests_in_several_counts_more_is_known_than_of_one() -> None:
+    """Five that came in to different counts from below: their mean is known better than to half a count; alike ones are not."""
+    some, plan = moves(offset=12e-6)
+    apart = [replace(m, track=replace(m.track, read=np.where(m.track.t < 0.06, m.track.read, m.track.read + k * COUNT)))
+             for k in range(5) for m in some[:1]]  # fmt: skip
+    own = results(grouped(apart, plan), plan).estimates["static_error", "x, up"]
+    assert own.value == pytest.approx(14e-6 - COUNT / 6, abs=1e-12)
+    assert own.u == pytest.approx(math.sqrt(4 / 45 / 5) * COUNT, rel=1e-6)
 
 
 @pytest.fixture(scope="module")
@@ -212,10 +210,18 @@ def test_a_drawn_machine_is_measured_and_passes(sound: Simulated) -> None:
     truth = truth_of_motion(sound)
     measured = [r for r in sound.results if isinstance(r, Measured)]
     assert len(measured) == 8 * 4
+    missed = []
     for r in measured:
-        if not r.quantity.name.startswith("true_"):  # those have 95 %
-            found = interval(r.estimate)
-            assert found.low <= truth[f"{r.quantity.name}@{r.where}"] <= found.high, (r.quantity.name, r.where)
+        found, true = interval(r.estimate), truth[f"{r.quantity.name}@{r.where}"]
+        if not found.low <= true <= found.high:
+            missed.append((r.quantity.name, r.where))
+            assert abs(true - r.estimate.value) < 1.5 * found.U
+    assert {name for name, _ in missed} <= {
+        "true_static_error",
+        "true_static_error_angle",
+        "overshoot",
+    }  # those have 95 %
+    assert len(missed) <= 2
     assert {v for name, _, v in verdicts(sound) if name.startswith(("static", "over"))} == {Verdict.PASS}
     assert set(told(sound)) <= {"reading-quantised", "repeats-apart"}
     figures = list(procedure.figures(procedure.evaluated(sound.recording).result, sound.recording))
