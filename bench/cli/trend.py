@@ -43,6 +43,9 @@ def trend_command(asked: TrendRequest) -> int:
     if asked.figure is not None and asked.figure.suffix != ".svg":
         raise ConfigError(f"--figure {asked.figure}: found {asked.figure.suffix or 'no ending'}; expected .svg. "
                           f"Next: --figure {asked.figure.with_suffix('.svg')}")  # fmt: skip
+    if asked.figure is not None and not asked.figure.parent.is_dir():
+        raise ConfigError(f"--figure {asked.figure}: found no folder {asked.figure.parent}; expected one that is there. "
+                          "Next: make it, or give another file")  # fmt: skip
     found, older = found_trend(asked)
     if asked.json:
         from bench.history.trendjson import as_data

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import sqlite3
+import sys
 from collections import Counter
 from collections.abc import Callable, Sequence
 from itertools import groupby, islice
@@ -207,7 +208,7 @@ def _there(
     rows = found if there is None else (row for row in found if row[0] in there)
     if last is None:
         return list(rows)
-    newest = [list(of_run) for _, of_run in islice(groupby(rows, key=itemgetter(0)), last)]
+    newest = [list(of_run) for _, of_run in islice(groupby(rows, key=itemgetter(0)), min(last, sys.maxsize))]
     return [row for of_run in reversed(newest) for row in reversed(of_run)]
 
 

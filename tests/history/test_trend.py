@@ -273,6 +273,7 @@ def test_the_command_refuses(tmp_path: Path, capsys: pytest.CaptureFixture[str])
         (["K_1"], "the nearest names are K_i"),
         (["K_i", "--rig", "other"], "leave them out"),
         (["K_i", "--figure", "k.png"], "found .png; expected .svg"),
+        (["K_i", "--figure", "nowhere/k.svg"], "found no folder nowhere; expected one that is there"),
         (["K_i", "--seed", "3"], "leave them out"),
     ):
         assert main(["trend", *arguments, "--out", str(tmp_path)]) == 2
