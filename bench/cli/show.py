@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sqlite3
 import sys
 import threading
@@ -110,7 +111,9 @@ class StoredRuns:
                 raise Refused(404, f"report: {path} is a link to somewhere else")
             return path.read_bytes()
         except OSError as error:
-            raise Refused(404, f"report: there is none. Next: bench report {directory.path}") from error
+            raise Refused(
+                404, f"report: there is none. Next: bench report {shlex.quote(str(directory.path))}"
+            ) from error
 
     def trend(self, asked: Query) -> Mapping[str, Any]:
         """A quantity's trend: as data, and what `bench trend` prints of it, by parts."""
