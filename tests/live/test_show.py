@@ -176,7 +176,8 @@ def test_a_trend_is_that_of_bench_trend(
 
 @pytest.mark.parametrize(("path", "says"), [
     ("/trend", "quantity: found none"), ("/trend?quantity=K_x", "trend of K_x"),
-    ("/trend?quantity=K_i&seed=x", "seed: found x"),
+    ("/trend?quantity=K_i&seed=x", "seed: found x"), (f"/trend?quantity=K_i&seed={2**63}", "expected a whole number from 0 to"),
+    ("/trend?quantity=K_i&seed=12345678901", "no such result"),
     ("/trend.svg?quantity=K_i&last=1", "last: found 1"), ("/runs?last=0", "last: found 0"),
     ("/runs?last=1&last=2", "each field once"),
     ("/runs?" + "&".join(f"a{k}=1" for k in range(20)), "at most 8 fields"), (f"/runs?filter={'x' * 201}", "200 characters"),
