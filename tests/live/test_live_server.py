@@ -167,19 +167,17 @@ def test_a_page_that_comes_while_a_simulation_stands_still_sees_where(made: Made
 
 def test_the_age_of_data_is_that_of_the_controllers(made: MadeRun, own: Client) -> None:
     """A device that is polled is stamped by the sample clock, here two seconds ahead of the host's."""
-    made.tap = Tap(["controller", "supply"])
     made.hello()
-    made.publisher.watch(made.tap, Buckets(made.view, "controller", 0), real_time=True)
+    watched = Tap(["controller", "supply"])
+    made.publisher.watch(watched, Buckets(made.view, "controller", 0), real_time=True)
     with Page(own) as page:
         page.wait("hello")
-        made.block()
+        made.block()  # into the tap that nobody watches any more
         (came_ns, block) = made.tap._held["controller"].pop()
-        heard_ns = WallClock().now_ns() - 100_000_000
-        polled = SampleBlock(
-            "supply", 0, np.zeros(1, np.uint64), np.zeros(1, np.int64), heard_ns + 2_000_000_000, 0, {}
-        )
-        made.tap._held["supply"].append((came_ns + 1, polled))
-        made.tap._held["controller"].append((came_ns, replace(block, host_ns=heard_ns)))
+        heard_ns, at = WallClock().now_ns() - 100_000_000, np.zeros(1, np.int64)
+        polled = SampleBlock("supply", 0, at.astype(np.uint64), at, heard_ns + 2_000_000_000, 0, {})
+        watched._held["supply"].append((came_ns + 1, polled))
+        watched._held["controller"].append((came_ns, replace(block, host_ns=heard_ns)))
         sample = page.wait("samples")
     assert 100 <= sample["age_ms"] < 60_000
 
