@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from bench.run.indexrow import KIND, NUMBERS, RUN_COLUMNS, IndexEntry, Kind, MachineKind, Result
-from bench.run.indexstore import NAME, VERSION, answered, put, rebuild, take_in, uncollected
+from bench.run.indexstore import NAME, VERSION, answered, on_disk, put, rebuild, take_in, uncollected
 from bench.rundir import RunDirectory
 
 __all__ = ["NAME", "SOUND", "VERSION", "IndexEntry", "MachineKind", "Result", "add", "entries", "kinds", "listing", "machines",
@@ -40,7 +40,7 @@ def add(run_dir: Path) -> None:
     from bench.run.indexed import row
 
     found = row(RunDirectory(run_dir.resolve()))
-    answered(run_dir.resolve().parent, lambda db: put(db, found))
+    on_disk(run_dir.resolve().parent, lambda db: put(db, found))
 
 
 def entries(
