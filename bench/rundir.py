@@ -12,6 +12,9 @@ from bench.errors import ConfigError
 
 NAME = re.compile(r"[a-z0-9-]+-\d{8}t\d{6}z-[0-9a-f]{4}", re.IGNORECASE)
 
+LARGEST = 2**63 - 1
+"""The largest seed or visit: what the index of a folder of runs holds."""
+
 LISTENED = "listen"
 """In the place of a procedure's name: a recording of `bench listen`, which is no run and has no record."""
 

@@ -100,3 +100,7 @@ def test_an_error_of_a_whole_file_names_it(tmp_path: Path) -> None:
     with pytest.raises(OSError, match="No such file") as caught:
         write_whole(tmp_path / "absent" / "record.json", "{}")
     assert caught.value.filename == str(tmp_path / "absent" / "record.json")
+    (tmp_path / "file").touch()  # what was begun cannot be taken away there either, as on a read-only system
+    with pytest.raises(OSError, match="Not a directory") as caught:
+        write_whole(tmp_path / "file" / "record.json", "{}")
+    assert caught.value.filename == str(tmp_path / "file" / "record.json")

@@ -101,6 +101,22 @@ def test_a_corrupt_run_is_skipped_with_a_message(tmp_path: Path) -> None:
         index.add(broken)
 
 
+@pytest.mark.parametrize("key", ["seed", "visit"])
+def test_a_number_that_no_table_holds_leaves_out_its_run_alone(key: str, tmp_path: Path) -> None:
+    run(tmp_path, 1)
+    path = run(tmp_path, 2) / "record.json"
+    numbers = {"seed": 3, "visit": 0, key: 2**63}
+    write_record(path, dataclasses.replace(read_record(path), **numbers))
+    (message,) = index.rebuild(tmp_path)
+    assert f"{path}: {key}: found 9223372036854775808; expected 9223372036854775807 at most" in message
+    assert outcomes(tmp_path) == ["PASS"]
+    assert [e.run_id for e in index.entries(tmp_path, last=10**20)] == [run(tmp_path, 1).name]
+    numbers[key] -= 1
+    write_record(path, dataclasses.replace(read_record(path), **numbers))
+    index.add(path.parent)
+    assert [getattr(e, key) for e in index.entries(tmp_path, last=1)] == [2**63 - 1]
+
+
 def test_deleted_runs_are_not_listed(tmp_path: Path) -> None:
     index.add(run(tmp_path, 1))
     shutil.rmtree(run(tmp_path, 1))

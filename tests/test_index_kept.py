@@ -8,8 +8,10 @@ import sqlite3
 from contextlib import closing
 from pathlib import Path
 
+import pytest
 from test_index import measuring, outcomes, run
 
+from bench.history.naming import run_named
 from bench.run import index
 from bench.run.index import _there
 from bench.run.indexstore import take_in
@@ -42,6 +44,24 @@ def test_an_index_that_cannot_be_written_answers_without_runs_deleted_since(tmp_
             found = [_there(db, query, (), last, there) for last in (None, 1, 2, 3)]
     listed = [[run_id[-7:-5] for (run_id,) in runs] for runs in found]
     assert listed == [["1Z", "3Z"], ["3Z"], ["1Z", "3Z"], ["1Z", "3Z"]]
+
+
+def test_a_folder_that_can_have_no_index_is_read_all_the_same(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """A share or a medium that cannot be written; here a folder has the index's name."""
+    paths = [measuring(tmp_path, second, 70.0 + second) for second in (1, 2, 3)]
+    kept = shutil.move(paths[2], tmp_path.parent / "kept")
+    (tmp_path / index.NAME).unlink()
+    (tmp_path / index.NAME).mkdir()
+    assert [r.value for r in index.results(tmp_path, quantity="K_i")] == [71.0, 72.0]
+    assert run_named("last~1", tmp_path).path == paths[0]
+    shutil.move(kept, paths[2])
+    shutil.rmtree(paths[0])
+    found, _ = index.listing(tmp_path)
+    assert [index.shown(tmp_path, "K_i", runs=[number])["K_i"][number][:2] for _, number, _ in found] == ["72", "73"]
+    assert len(caplog.messages) == 1
+    assert "index.sqlite: unable to open database file: the records are read instead" in caplog.text
+    with pytest.raises(sqlite3.OperationalError):
+        index.add(paths[1])
 
 
 def test_what_is_told_of_a_result_is_that_of_this_version(tmp_path: Path) -> None:

@@ -195,8 +195,14 @@ class Run(Judged):
         found = [s for s in steps if s.kind == kind and labels.items() <= s.labels.items()]
         if not found:
             asked = ", ".join([kind, *(f"{k}={v!r}" for k, v in labels.items())])
-            known = sorted({s.kind for s in steps})
-            raise ConfigError(f"{self.run_id}: found no step {asked}; it has steps {', '.join(known) or 'of no kind'}")
+            kinds = sorted({s.kind for s in steps})
+            known = dict.fromkeys(label for s in steps if s.kind == kind for label in s.labels)
+            has = (
+                f"its steps {kind} have the labels {', '.join(known)}"
+                if known
+                else f"it has steps {', '.join(kinds) or 'of no kind'}"
+            )
+            raise ConfigError(f"{self.run_id}: found no step {asked}; {has}")
         return found
 
     def analyse(self, plan: Mapping[str, Any] | None = None, procedure: str | os.PathLike[str] = "") -> Analysis:

@@ -16,6 +16,7 @@ from bench import catalogue
 from bench.errors import ConfigError, Problem
 from bench.inputfile import TomlError, parse_toml
 from bench.rigfile.toleranced import Toleranced, simulated
+from bench.rundir import LARGEST
 from bench.schema import expected_of
 
 SCHEMA = 1
@@ -42,7 +43,7 @@ class Step(_Table):
 class Virtual(_Table):
     """Many virtual rigs: seeds `first_seed` to `first_seed + count - 1`."""
 
-    first_seed: int = Field(0, ge=0)
+    first_seed: int = Field(0, ge=0, le=LARGEST)
     count: int = Field(ge=1)
 
 
@@ -62,8 +63,8 @@ class Campaign(_Table):
     title: str = ""
     rig: str = Field(min_length=1)
     backend: Literal["sim", "live"] = "sim"
-    seed: int | None = Field(None, ge=0)
-    visit: int | None = Field(None, ge=0)
+    seed: int | None = Field(None, ge=0, le=LARGEST)
+    visit: int | None = Field(None, ge=0, le=LARGEST)
     virtual: Virtual | None = None
     truth: Mapping[str, float] = {}
     step: tuple[Step, ...] = Field((), strict=False)

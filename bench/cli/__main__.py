@@ -150,12 +150,14 @@ def campaign(
     out: Annotated[Path, typer.Option("--out", help="Folder of the campaign directories.")] = Path("runs"),
     rig: Annotated[str | None, typer.Option("--rig", metavar="RIG", help="Another rig than the file's.")] = None,
     backend: Annotated[o.Backend | None, typer.Option(help="The simulated rig, or the real one.")] = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="One virtual rig: which.")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, max=o.LARGEST, help="One virtual rig: which.")] = None,
     visit: Annotated[
-        int | None, typer.Option(min=0, help="Another day of the same virtual rigs; default the file's.")
+        int | None, typer.Option(min=0, max=o.LARGEST, help="Another day of the same virtual rigs; default the file's.")
     ] = None,
     count: Annotated[int | None, typer.Option(min=1, help="Many virtual rigs: how many.")] = None,
-    first_seed: Annotated[int | None, typer.Option("--first-seed", min=0, help="Many: the first seed.")] = None,
+    first_seed: Annotated[
+        int | None, typer.Option("--first-seed", min=0, max=o.LARGEST, help="Many: the first seed.")
+    ] = None,
     link: o.Links = None,
     operator: Annotated[o.OperatorKind | None, typer.Option(help="One rig: as for `run`.")] = None,
     no_report: Annotated[bool, typer.Option("--no-report", help="Leave reports and summary out.")] = False,
@@ -234,8 +236,8 @@ def listen(
 @app.command()
 def serve(
     rig: o.RigArgument,
-    seed: Annotated[int, typer.Option(min=0, help="Which virtual rig.")] = 0,
-    visit: Annotated[int, typer.Option(min=0, help="Another day of the same virtual rig.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=o.LARGEST, help="Which virtual rig.")] = 0,
+    visit: Annotated[int, typer.Option(min=0, max=o.LARGEST, help="Another day of the same virtual rig.")] = 0,
     truth: o.Truth = None,
     bind: Annotated[str, typer.Option(metavar="ADDR", help="Address of every TCP port.")] = "127.0.0.1",
     truth_file: Annotated[Path | None, typer.Option("--truth-file", help="Write what was drawn to this file.")] = None,

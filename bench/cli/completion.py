@@ -86,9 +86,11 @@ def _taken(parameter: Any, hint: Any) -> Taken:
     return Taken(flags, words, kind, hint is bool or parameter.name == "help", about)
 
 
-def _asked(taken: Taken) -> str:
-    """Where the words come from, in a shell."""
-    return f"$(bench {HIDDEN} {taken.kind})" if taken.kind else " ".join(taken.words)
+def _asked(*taken: Taken) -> str:
+    """Where the words come from, in a shell: names are asked for, a line each, as they may have blanks."""
+    names = "\n".join(f"$(bench {HIDDEN} {one.kind})" for one in taken if one.kind)
+    words = " ".join(word for one in taken if not one.kind for word in one.words)
+    return f'names="{names}"' if names and not words else f'words="{words}"' + (f' names="{names}"' if names else "")
 
 
 def _bash(commands: tuple[Command, ...], *, zsh: bool) -> str:
@@ -96,12 +98,16 @@ def _bash(commands: tuple[Command, ...], *, zsh: bool) -> str:
     lines = ["autoload -U bashcompinit && bashcompinit"] if zsh else []
     lines += [
         "_bench() {",
-        '  local now="${COMP_WORDS[COMP_CWORD]}" before="${COMP_WORDS[COMP_CWORD-1]}" words=""',
+        '  local now="${COMP_WORDS[COMP_CWORD]}" before="${COMP_WORDS[COMP_CWORD-1]}" words="" names="" name',
         f'  local all="{" ".join(c.name for c in commands)} --help --version"',
         '  if [ "$COMP_CWORD" -eq 1 ]; then words="$all"; else case "${COMP_WORDS[1]}" in',
         *(line for c in commands for line in _bash_command(c)),
         "  esac; fi",
         '  COMPREPLY=($(compgen -W "$words" -- "$now"))',
+        "  while IFS= read -r name; do",
+        '    printf -v name %q "$name"',
+        """    case "$name" in "''") ;; "$now"*) COMPREPLY+=("$name") ;; esac""",
+        '  done <<< "$names"',
         "}",
         "complete -o default -F _bench bench",
     ]
@@ -112,10 +118,9 @@ def _bash_command(command: Command) -> Iterator[str]:
     valued = [o for o in command.options if not o.flag]
     yield f'    {command.name}) case "$before" in'
     for option in valued:
-        yield f'      {"|".join(option.flags)}) words="{_asked(option)}" ;;'
+        yield f"      {'|'.join(option.flags)}) {_asked(option)} ;;"
     flags = " ".join(flag for o in command.options for flag in o.flags if flag.startswith("--"))
-    names = " ".join(_asked(argument) for argument in command.arguments)
-    yield f'      *) case "$now" in -*) words="{flags} --help" ;; *) words="{names}" ;; esac ;;'
+    yield f'      *) case "$now" in -*) words="{flags} --help" ;; *) {_asked(*command.arguments)} ;; esac ;;'
     yield "    esac ;;"
 
 

@@ -8,6 +8,8 @@ from typing import Annotated
 
 import typer
 
+from bench.rundir import LARGEST
+
 
 class Backend(StrEnum):
     """What stands behind the rig's links."""
@@ -84,9 +86,10 @@ RunArgument = Annotated[
 ]
 RigArgument = Annotated[str, typer.Argument(metavar="RIG", help="A rig file, or its name in rigs/.")]
 RigOption = Annotated[str, typer.Option("--rig", metavar="RIG", help="A rig file, or its name in rigs/.")]
-Seed = Annotated[int | None, typer.Option(min=0, help="Which virtual rig (simulation only; default 0).")]
+Seed = Annotated[int | None, typer.Option(min=0, max=LARGEST, help="Which virtual rig (simulation only; default 0).")]
 Visit = Annotated[
-    int | None, typer.Option(min=0, help="Another day of the same virtual rig (simulation only; default 0).")
+    int | None,
+    typer.Option(min=0, max=LARGEST, help="Another day of the same virtual rig (simulation only; default 0)."),
 ]
 Plans = Annotated[list[str] | None, typer.Option("--plan", metavar="KEY=VALUE", help="A setting; repeatable.")]
 PlanFile = Annotated[Path | None, typer.Option("--plan-file", help="Settings from a TOML file.")]

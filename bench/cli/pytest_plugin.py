@@ -26,14 +26,24 @@ if TYPE_CHECKING:
     from bench.cli.suite import Suite
     from bench.run.runner import RunResult
 
+
+def _number(text: str) -> int:
+    """A seed or visit."""
+    from bench.rundir import LARGEST
+
+    if not (text.isascii() and text.isdecimal() and int(text) <= LARGEST):
+        raise argparse.ArgumentTypeError(f"found {text!r}; expected a whole number from 0 to {LARGEST}")
+    return int(text)
+
+
 NAME = "levbench"  # of the plug-in, and the prefix of options whose own name is taken
 SUITE: pytest.StashKey[Suite] = pytest.StashKey()
 TAKEN: pytest.StashKey[tuple[str, ...]] = pytest.StashKey()
 OPTIONS: dict[str, dict[str, Any]] = {
     "rig": {"metavar": "RIG", "help": "a rig file, or its name in rigs/"},
     "backend": {"choices": ("sim", "live"), "default": "sim", "help": "the simulated rig, or the real one"},
-    "seed": {"type": int, "help": "which virtual rig (simulation only)"},
-    "visit": {"type": int, "help": "another day of the same virtual rig (simulation only)"},
+    "seed": {"type": _number, "metavar": "N", "help": "which virtual rig (simulation only)"},
+    "visit": {"type": _number, "metavar": "N", "help": "another day of the same virtual rig (simulation only)"},
     "plan": {"action": "append", "default": [], "metavar": "[PROCEDURE:]KEY=VALUE",
              "help": "a setting, of one procedure or of each that has it; repeatable"},
     "fault": {"action": "append", "default": [], "metavar": "FAULT", "help": "a fault to inject; repeatable"},

@@ -37,13 +37,17 @@ def schema_command(kind: str, into: Path | None) -> int:
     """Write one schema on standard output, or all into a folder.
 
     Raises:
-        ConfigError: there is no such schema.
+        ConfigError: there is no such schema, or a file where the folder would be.
         BenchError: the folder cannot be written.
     """
     if kind and into is None:
         sys.stdout.write(text_of(kind))
         return 0
     folder = into or Path("schemas")
+    if folder.exists() and not folder.is_dir():
+        raise ConfigError(
+            f"--into {folder}: found a file; expected a folder, or a name that is free. Next: give another"
+        )
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name in [kind] if kind else kinds():

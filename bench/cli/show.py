@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sqlite3
 import sys
 import threading
@@ -20,7 +21,7 @@ from bench.os_signals import delivered_to
 from bench.record.records import read_record
 from bench.run import index
 from bench.run.indexrow import IndexEntry, MachineKind
-from bench.rundir import RunDirectory
+from bench.rundir import LARGEST, RunDirectory
 
 SCHEMA, SHOWN = 1, 100  # runs of a list where nothing is said of their number
 Query = Mapping[str, str]
@@ -110,7 +111,9 @@ class StoredRuns:
                 raise Refused(404, f"report: {path} is a link to somewhere else")
             return path.read_bytes()
         except OSError as error:
-            raise Refused(404, f"report: there is none. Next: bench report {directory.path}") from error
+            raise Refused(
+                404, f"report: there is none. Next: bench report {shlex.quote(str(directory.path))}"
+            ) from error
 
     def trend(self, asked: Query) -> Mapping[str, Any]:
         """A quantity's trend: as data, and what `bench trend` prints of it, by parts."""
@@ -192,6 +195,6 @@ def _whole(asked: Query, name: str, default: int, least: int = 0) -> int:
         Refused: 400, it is none or out of range.
     """
     text = asked.get(name, str(default))
-    if not (text.isascii() and text.isdigit() and len(text) <= 10 and least <= int(text)):
-        raise Refused(400, f"{name}: found {text[:40]}; expected a whole number from {least} on")
+    if not (text.isascii() and text.isdigit() and least <= int(text) <= LARGEST):
+        raise Refused(400, f"{name}: found {text[:40]}; expected a whole number from {least} to {LARGEST}")
     return int(text)

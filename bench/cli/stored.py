@@ -9,6 +9,7 @@ import typer
 
 from bench.cli.options import Calibrations, Machine, Out, ProcedureFile, RunArgument, Table, Verbose
 from bench.run.indexrow import MachineKind
+from bench.rundir import LARGEST
 
 
 def adopt(
@@ -127,7 +128,9 @@ def trend(
     procedure: Annotated[
         str | None, typer.Option("--procedure", metavar="PROCEDURE", help="Only runs of this procedure.")
     ] = None,
-    seed: Annotated[int | None, typer.Option("--seed", min=0, help="Only runs of this virtual machine.")] = None,
+    seed: Annotated[
+        int | None, typer.Option("--seed", min=0, max=LARGEST, help="Only runs of this virtual machine.")
+    ] = None,
     machine: Annotated[
         Machine | None,
         typer.Option("--machine", help="Only runs of such a machine; default real, where there are any."),

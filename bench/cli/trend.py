@@ -38,11 +38,14 @@ def trend_command(asked: TrendRequest) -> int:
 
     Raises:
         ConfigError: nothing to follow, several things, or an option that cannot be.
-        BenchError: the index can neither be read nor rebuilt.
+        BenchError: the index can neither be read nor rebuilt, or the figure cannot be written.
     """
     if asked.figure is not None and asked.figure.suffix != ".svg":
         raise ConfigError(f"--figure {asked.figure}: found {asked.figure.suffix or 'no ending'}; expected .svg. "
                           f"Next: --figure {asked.figure.with_suffix('.svg')}")  # fmt: skip
+    if asked.figure is not None and not asked.figure.parent.is_dir():
+        raise ConfigError(f"--figure {asked.figure}: found no folder {asked.figure.parent}; expected one that is there. "
+                          "Next: make it, or give another file")  # fmt: skip
     found, older = found_trend(asked)
     if asked.json:
         from bench.history.trendjson import as_data
@@ -53,7 +56,12 @@ def trend_command(asked: TrendRequest) -> int:
 
         sys.stdout.write(text(found, older))
     if asked.figure is not None:
-        write_whole(asked.figure, drawn(found))
+        try:
+            write_whole(asked.figure, drawn(found))
+        except OSError as error:
+            raise BenchError(
+                f"--figure {asked.figure}: cannot be written: {error.strerror or error}. Next: give another"
+            ) from error
         sys.stderr.write(f"figure: {asked.figure}\n")
     return 0
 

@@ -188,7 +188,7 @@ def _drift(s: Segment, t: Told) -> Iterator[str]:
     finer = _digits(half, t)
     shown = "" if d.shown else ": no drift is shown"
     yield (f"drift: {_signed(slope, t, finer)} ± {t.with_unit(half, finer)} per {t.per} (95 %){shown}; scatter about it "
-           f"{t.with_unit(d.scatter, 1)}, {d.dof} degrees of freedom")  # fmt: skip
+           f"{t.with_unit(d.scatter, 1)}, {d.dof} degree{'s' if d.dof > 1 else ''} of freedom")  # fmt: skip
     if s.excess is not None:
         yield (f"the runs scatter {s.excess:.2g} times as much as their own uncertainties can explain: something moves them "
                "that no budget has")  # fmt: skip

@@ -13,8 +13,8 @@ OUT_OF_DATE = (CERTIFICATE_OVERDUE, "certificate-ahead")
 
 
 def cautions(a: Record, b: Record) -> Iterator[str]:
-    """A sentence each: one simulation or recording twice, records that do not say with what, units that differ, runs that could
-    not be judged, certificates and calibrations that did not hold on their day."""
+    """A sentence each: one simulation or recording twice, plans that may measure different things, records that do not say with
+    what, units that differ, runs that could not be judged, certificates and calibrations that did not hold on their day."""
     yield from _together(a, b)
     for letter, record in (("A", a), ("B", b)):
         yield from _of_one(letter, record)
@@ -24,6 +24,9 @@ def _together(a: Record, b: Record) -> Iterator[str]:
     if a.seed is not None and (a.seed, a.visit, a.rig) == (b.seed, b.visit, b.rig):
         yield (f"both simulate visit {a.visit} of seed {a.seed}: B has the same errors as A once more, and equal values say "
                "nothing of how they repeat")  # fmt: skip
+    if any(a.plan.get(key) != b.plan.get(key) for key in (*a.plan, *b.plan)):
+        yield ("the plans differ: where a setting says what is measured (over how many angles, at which bias) one name stands "
+               "for two quantities, and E_n has that in it")  # fmt: skip
     if _recordings(a) & _recordings(b):
         yield "both rest on steps of one recording, which one of them goes on with: U takes their scatter for two"
     if silent := [letter for letter, record in (("A", a), ("B", b)) if record.setup is None]:

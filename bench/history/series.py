@@ -48,15 +48,16 @@ def one_history(
     if not found:
         raise ConfigError(_nothing(quantity, known(), place))
     _require_one("quantity", (r.name for r in found), f"trend of {quantity}", "Next: `bench trend {!r}`")
-    units = {(r.procedure, r.unit) for r in found}
+    whole = [r for r in found if r.value is not None and r.outcome not in BROKEN]
+    told = whole or found  # a run that gave no value is no other history
+    units = {(r.procedure, r.unit) for r in told}
     if len({unit for _, unit in units}) > 1:
         listed = "; ".join(f"{unit} by {procedure}" for procedure, unit in sorted(units))
         raise ConfigError(
             f"trend of {quantity}: found different units: {listed}; expected one. Next: add --procedure NAME"
         )
-    _require_one("procedure", (r.procedure for r in found), f"trend of {quantity}", "Next: add --procedure {}")
-    _require_one("machine", map(machine, found), f"trend of {quantity}", f"Next: {_apart(found)}")
-    whole = [r for r in found if r.value is not None and r.outcome not in BROKEN]
+    _require_one("procedure", (r.procedure for r in told), f"trend of {quantity}", "Next: add --procedure {}")
+    _require_one("machine", map(machine, told), f"trend of {quantity}", f"Next: {_apart(told)}")
     once = _each_once(whole)
     if len(once) < 2:
         raise ConfigError(f"trend of {quantity}: found {_counted(len(once), 'run')} with a value in {place}; expected 2 or "
@@ -64,13 +65,18 @@ def one_history(
     by_visit = once[0].seed is not None and len({r.visit for r in once}) == len(once)
     timed = sorted((float(r.visit or 0) if by_visit else days(r.started), k) for k, r in enumerate(once))
     return History(tuple(once[k] for _, k in timed), tuple(t for t, _ in timed), "visit" if by_visit else "date",
-                   len(found) - len(whole), len(whole) - len(once), twins)  # fmt: skip
+                   _same(found, once[0]) - len(whole), len(whole) - len(once), twins)  # fmt: skip
 
 
 def machine(r: Result) -> str:
     """Which machine a result is of, in words."""
     which = f"seed {r.seed}" if r.seed is not None else "served simulation" if r.served else r.uut
     return f"{r.rig} ({which})" if which else r.rig
+
+
+def _same(found: Iterable[Result], one: Result) -> int:
+    """How many results are of the procedure and machine of one."""
+    return sum((r.procedure, machine(r)) == (one.procedure, machine(one)) for r in found)
 
 
 def _apart(found: Sequence[Result]) -> str:

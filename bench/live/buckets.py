@@ -21,20 +21,20 @@ RPM = 30 / math.pi  # revolutions per minute of 1 rad/s
 
 
 class Buckets:
-    """Of one run: `origin_ns` is the sample clock's at its start. Keeps what slow devices read last, and how many samples were
-    not shown."""
+    """Of one run: `main` is the stream whose samples they are, `origin_ns` the sample clock's at its start. Keeps what slow
+    devices read last, and how many samples were not shown."""
 
     def __init__(self, view: View, main: str, origin_ns: int) -> None:
-        self._view, self._main, self._origin_ns = view, main, origin_ns
+        self._view, self.main, self._origin_ns = view, main, origin_ns
         self._slow: dict[str, float] = {}
         self._next: int | None = None  # sample that follows what was shown
 
     def message(self, taken: Mapping[str, Sequence[SampleBlock]], age_ms: float) -> dict[str, Any] | None:
         """What is sent of the blocks that were taken; None without one of the main stream."""
         for stream, blocks in taken.items():
-            if stream != self._main:
+            if stream != self.main:
                 self._slow |= {name: float(x[-1]) for name, x in blocks[-1].columns.items() if len(x)}
-        blocks = [b for b in taken.get(self._main, ()) if len(b)]
+        blocks = [b for b in taken.get(self.main, ()) if len(b)]
         if not blocks:
             return None
         first, last = blocks[0].first_index, blocks[-1]

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Protocol
 
+from bench.clock import WallClock
 from bench.live.buckets import Buckets
 from bench.live.hub import Hub
 from bench.samples import SampleBlock
@@ -31,27 +32,28 @@ class Publisher:
 
     def __init__(self, hub: Hub) -> None:
         self._hub = hub
-        self._watched: tuple[Source, Buckets, bool] | None = None
+        self._watched: tuple[Source, Buckets, WallClock | None] | None = None
         self._end = threading.Event()
 
     def watch(self, tap: Source, buckets: Buckets, *, real_time: bool) -> None:
-        """Show the samples of a tap from now on. In real time their age counts from when the host heard them, else from when
-        they came into the tap."""
-        self._watched = tap, buckets, real_time
+        """Show the samples of a tap from now on. In real time their age counts from when the host heard them, by a clock that
+        does not step as the links' does not; else from when they came into the tap."""
+        self._watched = tap, buckets, WallClock() if real_time else None
 
     def look(self) -> None:
         """Once: what was told, and the newest samples if a page waits."""
         self._hub.settle()
         if self._watched is None or not self._hub.wanted:
             return
-        tap, buckets, real_time = self._watched
+        tap, buckets, host = self._watched
         now = time.monotonic_ns()
         # A simulation stands still while somebody is asked: who looks then sees where it stands, and how long ago that was.
-        taken = tap.take(now - OLD_NS if real_time else 0)
+        taken = tap.take(now - OLD_NS if host else 0)
         if taken:
-            came_ns, newest = max((blocks[-1] for blocks in taken.values()), key=lambda one: one[0])
-            age_ms = (time.time_ns() - newest.host_ns if real_time else now - came_ns) * 1e-6
-            message = buckets.message({name: [b for _, b in blocks] for name, blocks in taken.items()}, age_ms)
+            message = buckets.message(
+                {name: [b for _, b in blocks] for name, blocks in taken.items()},
+                _age_ms(taken.get(buckets.main, ()), now, host),
+            )
             if message is not None:
                 self._hub.publish("samples", message)
 
@@ -78,3 +80,12 @@ class Publisher:
             self.look()
         except Exception:
             logger.debug("the live page could not be served", exc_info=True)
+
+
+def _age_ms(blocks: Sequence[tuple[int, SampleBlock]], now: int, host: WallClock | None) -> float:
+    """How old the newest block is; 0 of none. Of the main stream: a polled device's is stamped by the sample clock, which may
+    be ahead of the host's."""
+    if not blocks:
+        return 0.0
+    came_ns, newest = blocks[-1]
+    return (host.now_ns() - newest.host_ns if host else now - came_ns) * 1e-6

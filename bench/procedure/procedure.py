@@ -32,8 +32,16 @@ __all__ = ["BenchPlan", "Measured", "Procedure", "Quantity", "read_method"]
 
 
 def read_method(file: str) -> str:
-    """The report's method section of a procedure: `method.md` beside its `file`, plain paragraphs parted by empty lines."""
-    return Path(file).with_name("method.md").read_text("utf-8")
+    """The report's method section of a procedure: `method.md` beside its `file`, plain paragraphs parted by empty lines.
+
+    Raises:
+        ConfigError: there is none.
+    """
+    path = Path(file).with_name("method.md")
+    if not path.is_file():
+        raise ConfigError(f"{path}: found none; expected the report's method section. Next: write it there, or give "
+                          'Procedure its text: method="..."')  # fmt: skip
+    return path.read_text("utf-8")
 
 
 def _as_recorded(recording: Recording[Any], _: Findings) -> Recording[Any]:

@@ -6,6 +6,7 @@ the data, the limits, the end of the run and its times: where the two differ, it
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -34,8 +35,9 @@ def require_agreement(path: Path, record: Record, again: Record, levbench: str) 
     problems = (*_facts(record, again), *_outcomes(record, again), *_values(record, again))
     if problems:
         older = "" if levbench == __version__ else f", or adopt it with Levbench {levbench}"
-        title = (f"{path}: the record contradicts its recording; nothing was adopted. Next: `bench analyse {path}` writes what "
-                 f"the recording gives, `bench run {again.procedure}` makes a new run{older}")  # fmt: skip
+        analyse = f"bench analyse {shlex.quote(str(path))}"
+        title = (f"{path}: the record contradicts its recording; nothing was adopted. Next: `{analyse}` writes what the "
+                 f"recording gives, `bench run {again.procedure}` makes a new run{older}")  # fmt: skip
         raise ConfigError(title, problems)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import sqlite3
+import sys
 from collections import Counter
 from collections.abc import Callable, Sequence
 from itertools import groupby, islice
@@ -13,7 +14,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from bench.run.indexrow import KIND, NUMBERS, RUN_COLUMNS, IndexEntry, Kind, MachineKind, Result
-from bench.run.indexstore import NAME, VERSION, answered, put, rebuild, take_in, uncollected
+from bench.run.indexstore import NAME, VERSION, answered, on_disk, put, rebuild, take_in, uncollected
 from bench.rundir import RunDirectory
 
 __all__ = ["NAME", "SOUND", "VERSION", "IndexEntry", "MachineKind", "Result", "add", "entries", "kinds", "listing", "machines",
@@ -39,7 +40,7 @@ def add(run_dir: Path) -> None:
     from bench.run.indexed import row
 
     found = row(RunDirectory(run_dir.resolve()))
-    answered(run_dir.resolve().parent, lambda db: put(db, found))
+    on_disk(run_dir.resolve().parent, lambda db: put(db, found))
 
 
 def entries(
@@ -207,7 +208,7 @@ def _there(
     rows = found if there is None else (row for row in found if row[0] in there)
     if last is None:
         return list(rows)
-    newest = [list(of_run) for _, of_run in islice(groupby(rows, key=itemgetter(0)), last)]
+    newest = [list(of_run) for _, of_run in islice(groupby(rows, key=itemgetter(0)), min(last, sys.maxsize))]
     return [row for of_run in reversed(newest) for row in reversed(of_run)]
 
 

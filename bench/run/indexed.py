@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 
+from bench.errors import ConfigError
 from bench.findings import CERTIFICATE_OVERDUE, SIMULATED_CONTROLLER
 from bench.record.records import Measurement, Record, read_record
 from bench.record.setup import Setup
@@ -12,7 +13,7 @@ from bench.record.told import with_unit
 from bench.rigfile.aliases import in_full
 from bench.rigfile.certificates import numbers_told
 from bench.run.indexrow import IndexEntry, MadeWith, Row
-from bench.rundir import RunDirectory
+from bench.rundir import LARGEST, RunDirectory
 from bench.uncertainty import PROBABILITY
 
 DIGITS = 16  # of a digest: of a million different plans two agree once in 4e7
@@ -22,9 +23,12 @@ def row(run: RunDirectory) -> Row:
     """A run with its results, as the tables have it.
 
     Raises:
-        ConfigError: it holds no readable record.
+        ConfigError: it holds no readable record, or one of a seed or visit that the tables cannot hold.
     """
     record = read_record(run.record)
+    for key, number in (("seed", record.seed), ("visit", record.visit)):
+        if number is not None and abs(number) > LARGEST:
+            raise ConfigError(f"{run.record}: {key}: found {number}; expected {LARGEST} at most")
     setup = record.setup
     # The directory's name, not the record's: a copied directory is another run to whoever looks for it.
     entry = IndexEntry(

@@ -10,6 +10,7 @@ import sqlite3
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing, contextmanager, suppress
+from functools import lru_cache
 from pathlib import Path
 from typing import TypeVar
 
@@ -21,6 +22,7 @@ NAME = "index.sqlite"
 VERSION = 8  # of the tables, and of how results are told in them; another one is rebuilt
 TICK_NS = 1_000_000_000  # two changes of a folder that are nearer may have one time
 LISTED_NS = 10_000_000_000  # so much older an index is made that knows all of its folder: nothing else makes it so
+UNWRITABLE = (sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_READONLY)
 T = TypeVar("T")
 log = logging.getLogger(__name__)
 
@@ -28,12 +30,14 @@ log = logging.getLogger(__name__)
 def rebuild(root: Path) -> list[str]:
     """Make the index anew from the records; what cannot be read is left out and named in the messages returned."""
     try:
-        return _filled(root)
+        with _opened(root) as db:
+            return _filled(db, root)
     except sqlite3.OperationalError:
         raise  # locked or not writable: deleting it would not help
     except sqlite3.DatabaseError:
         (root / NAME).unlink(missing_ok=True)
-        return _filled(root)
+        with _opened(root) as db:
+            return _filled(db, root)
 
 
 def take_in(db: sqlite3.Connection, root: Path) -> set[str] | None:
@@ -43,7 +47,7 @@ def take_in(db: sqlite3.Connection, root: Path) -> set[str] | None:
     Returns the names in the folder where the index cannot be made to have these alone.
     """
     own, changed_ns = root / NAME, root.stat().st_mtime_ns
-    if own.stat().st_mtime_ns == changed_ns - LISTED_NS:
+    if own.is_file() and own.stat().st_mtime_ns == changed_ns - LISTED_NS:
         return None
     known = {run_id for (run_id,) in db.execute("SELECT run_id FROM runs")}
     there = set(os.listdir(root))  # after those, so that one that begins and ends meanwhile is new and not gone
@@ -96,7 +100,17 @@ def _ended(names: Iterable[str], root: Path, messages: list[str]) -> Iterator[Ro
 
 def answered(root: Path, ask: Callable[[sqlite3.Connection], T]) -> T:
     """What the index answers. One that is missing, of another version or corrupt is rebuilt first: that shows where it is read,
-    as a check of the whole would take longer than any answer."""
+    as a check of the whole would take longer than any answer. In a folder that cannot be written it is kept in memory."""
+    try:
+        return on_disk(root, ask)
+    except sqlite3.OperationalError as error:
+        if error.sqlite_errorcode & 0xFF not in UNWRITABLE:
+            raise
+        return ask(_in_memory(root.resolve(), str(error)))
+
+
+def on_disk(root: Path, ask: Callable[[sqlite3.Connection], T]) -> T:
+    """The same of its file alone: what is put in must stay."""
     for _ in range(2):
         try:
             with _opened(root) as db:
@@ -112,17 +126,26 @@ def answered(root: Path, ask: Callable[[sqlite3.Connection], T]) -> T:
         return ask(db)
 
 
-def _filled(root: Path) -> list[str]:
+@lru_cache(maxsize=4)
+def _in_memory(root: Path, why: str) -> sqlite3.Connection:
+    """An index for this process alone, made once. `bench show` asks in many threads, one at a time."""
+    log.warning(f"{root / NAME}: {why}: the records are read instead, which takes longer")
+    db = sqlite3.connect(":memory:", check_same_thread=False)
+    with db:
+        _filled(db, root)
+    return db
+
+
+def _filled(db: sqlite3.Connection, root: Path) -> list[str]:
     messages: list[str] = []
-    with _opened(root) as db:
-        db.execute("BEGIN IMMEDIATE")  # before the records are read: another process adds before or after, not between
-        for table in ("runs", "kinds", "made_with", "names", "results"):
-            db.execute(f"DROP TABLE IF EXISTS {table}")
-        for statement in filter(str.strip, TABLES.split(";")):
-            db.execute(statement)
-        for found in _ended((run.run_id for run in runs_in(root)), root, messages):
-            put(db, found)
-        db.execute(f"PRAGMA user_version = {VERSION}")
+    db.execute("BEGIN IMMEDIATE")  # before the records are read: another process adds before or after, not between
+    for table in ("runs", "kinds", "made_with", "names", "results"):
+        db.execute(f"DROP TABLE IF EXISTS {table}")
+    for statement in filter(str.strip, TABLES.split(";")):
+        db.execute(statement)
+    for found in _ended((run.run_id for run in runs_in(root)), root, messages):
+        put(db, found)
+    db.execute(f"PRAGMA user_version = {VERSION}")
     for message in messages:
         log.warning(message)
     return messages

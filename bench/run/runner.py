@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import logging
+import shlex
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack, nullcontext, suppress
 from dataclasses import dataclass, replace
@@ -163,7 +164,7 @@ def _written(directory: RunDirectory, result: RunResult) -> RunResult:
         return result
     except OSError as error:
         text = (f"{directory.record}: cannot be written: {error.strerror or error}; what stands there is older. Next: free "
-                f"space there, then `bench analyse {directory.path}`")  # fmt: skip
+                f"space there, then `bench analyse {shlex.quote(str(directory.path))}`")  # fmt: skip
         logger.error("%s", text)
         added = findings_of([Finding("record-not-written", text, "record", Effect.ERROR)])
         findings = (*result.record.findings, *added)

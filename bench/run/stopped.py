@@ -7,6 +7,7 @@ completed, a procedure that cannot go on in the middle; another rig, plan or con
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, replace
 from datetime import UTC, datetime
@@ -73,7 +74,7 @@ def left_of(run: RunDirectory, recording: Recording[Any], procedure: Procedure) 
         if ending.stopped is None:
             raise ConfigError(
                 f"{run.path}: this run came to its end; expected one that was stopped{NOTHING} Next: its report, or "
-                f"`bench analyse {run.path}`"
+                f"`bench analyse {shlex.quote(str(run.path))}`"
             )
         if not done:
             kind = procedure.continues

@@ -71,8 +71,12 @@ def test_steps_by_kind_and_labels(run: Run) -> None:
     odd = run["pos_yi"].during("dwell", odd=True)
     assert [len(part) for part in odd] == [100] * 11
     assert odd[0].time[0] == 0.1
-    with pytest.raises(ConfigError, match=r"found no step dwell, block=99; it has steps dwell"):
+    with pytest.raises(
+        ConfigError, match=r"found no step dwell, block=99; its steps dwell have the labels block, odd$"
+    ):
         run["pos_yi"].during("dwell", block=99)
+    with pytest.raises(ConfigError, match=r"found no step dwel; it has steps dwell$"):
+        run["pos_yi"].during("dwel")
 
 
 def test_captures_are_counted_as_their_files_are(run: Run) -> None:

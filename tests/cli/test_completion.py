@@ -28,7 +28,7 @@ def offered(words: str, folder: Path) -> list[str]:
     done = subprocess.run(["bash", "-c", ASK.format(words=words)], cwd=folder, env={**os.environ, "PATH": path},
                           capture_output=True, text=True, check=True)  # fmt: skip
     assert done.stderr == ""
-    return done.stdout.split()
+    return done.stdout.split("\n")[:-1] if done.stdout.strip() else []
 
 
 @pytest.mark.parametrize(
@@ -76,11 +76,12 @@ def test_quantities_are_those_that_were_measured(tmp_path: Path) -> None:
     measuring(tmp_path / "runs", 1, 71.0)
     for words in ("bench trend K", "bench runs --show K"):
         assert offered(words, tmp_path) == ["K_i"]
+    assert offered("bench trend B", tmp_path) == ["B", r"B@by\ the\ channel"]  # one word of the shell each
     (tmp_path / "runs" / "amb-calibration-20260101T000002Z-3f2a").mkdir()  # what it cannot read is told elsewhere
     assert offered("bench trend K", tmp_path) == ["K_i"]
     (tmp_path / "runs" / "index.sqlite").unlink()
-    (tmp_path / "runs" / "index.sqlite").mkdir()
-    assert offered("bench trend K", tmp_path) == []
+    (tmp_path / "runs" / "index.sqlite").mkdir()  # as in a folder that cannot be written: records are read instead
+    assert offered("bench trend K", tmp_path) == ["K_i"]
 
 
 def test_every_procedure_and_command_is_known(tmp_path: Path) -> None:

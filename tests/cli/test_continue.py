@@ -102,10 +102,10 @@ def test_a_changed_rig_file_is_refused_with_what_differs(bench: Bench, tmp_path:
 
 
 def test_a_run_that_came_to_its_end(bench: Bench, tmp_path: Path) -> None:
-    path = ran(CALIBRATION, tmp_path / "runs").directory
+    path = ran(CALIBRATION, tmp_path / "my runs").directory
     said = refused(bench, path)
     assert "this run came to its end; expected one that was stopped" in said
-    assert f"bench analyse {path}" in said
+    assert f"bench analyse '{path}'" in said
 
 
 def test_a_run_that_is_still_being_written(bench: Bench, first: RunResult, tmp_path: Path) -> None:

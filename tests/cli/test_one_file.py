@@ -170,6 +170,9 @@ def test_one_of_ours_by_its_file_is_what_it_is_by_name() -> None:
 def test_it_takes_plans_limits_and_a_method(bench: Bench) -> None:
     text = small("look-here").replace("step_count=", "method=read_method(__file__), step_count=")
     Path("look.py").write_text(text.replace("Measured, Procedure", "Measured, Procedure, read_method", 1))
+    status, _, err = bench("run", "./look.py", *RIG)
+    assert status == 2
+    assert "method.md: found none; expected the report's method section. Next: write it there, or give" in err
     Path("method.md").write_text("The supply is looked at.\n")
     rig = load_rig("tsbs12")
     Path("mine.toml").write_text(f"{rig.toml_text}\n[plans.look-here]\nseconds = 0.5\n")

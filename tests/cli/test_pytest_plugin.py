@@ -61,6 +61,13 @@ def test_a_session_without_a_rig_has_none_of_the_options(tmp_path: Path) -> None
     assert "procedures on a rig: pytest --rig RIG" in session(tmp_path, "--help")[1]
 
 
+def test_a_seed_that_is_none_is_refused_before_anything_is_collected(tmp_path: Path) -> None:
+    for option, text in (("--seed", "-3"), ("--visit", "1.5"), ("--seed", str(2**63))):
+        status, out = session(tmp_path, "--rig", "tsbs12", f"{option}={text}")
+        assert status == 4, out
+        assert f"argument {option}: found '{text}'; expected a whole number from 0 to" in out
+
+
 def test_a_file_is_collected_and_run_from_any_folder(tmp_path: Path) -> None:
     (tmp_path / "look.py").write_text(small("look-here") + "\ndef test_never(): raise ValueError\n")
     status, out = session(tmp_path, "look.py", "--rig", "tsbs12", "--no-report", "--seed", "3", "--junitxml=j.xml",

@@ -118,6 +118,14 @@ def test_all_are_written_into_a_folder(tmp_path: Path, capsys: pytest.CaptureFix
     assert "#:schema schemas/rig.schema.json" in capsys.readouterr().err
 
 
+def test_a_file_is_no_folder_for_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "schemas"
+    path.write_text("mine")
+    assert main(["schema", "--into", str(path)]) == 2
+    assert "found a file; expected a folder" in capsys.readouterr().err
+    assert path.read_text() == "mine"
+
+
 def test_a_kind_that_is_none_is_answered_by_the_nearest(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["schema", "plan-unbalanc"]) == 2
     assert "Did you mean unbalance?" in capsys.readouterr().err

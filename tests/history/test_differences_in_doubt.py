@@ -36,6 +36,7 @@ def test_what_the_budgets_do_not_say_is_a_caution() -> None:
             "B ended INDETERMINATE (drift-between-halves)",
         ),
         ({"outcome": Outcome.ABORTED}, "B ended ABORTED: its values"),
+        ({"plan": {**b.plan, "angles": 1}}, "the plans differ: where a setting says what is measured"),
         ({"findings": findings_of([overdue])}, "B rests on certificates that did not hold on its day: force"),
         ({"calibrations": (used,)}, "B rests on calibrations that had expired: unbalance"),
         ({"setup": None}, "B: a record of before schema 3"),
@@ -43,6 +44,7 @@ def test_what_the_budgets_do_not_say_is_a_caution() -> None:
     ):
         (found,) = compared(a, dataclasses.replace(b, **change)).cautions  # type: ignore[arg-type]
         assert said in found
+    assert compared(a, dataclasses.replace(b, plan={**b.plan, "rounds": None})).cautions == ()
     once = {"seed": 3, "visit": 0}
     (found,) = compared(dataclasses.replace(a, **once), dataclasses.replace(b, **once)).cautions  # type: ignore[arg-type]
     assert "both simulate visit 0 of seed 3" in found

@@ -256,6 +256,12 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     out = capsys.readouterr().out
     assert out.startswith("K_i of amb-calibration on tsbs12 (7)\n12 runs, 2026-01-05 08:00 to 2026-01-16 08:00\n")
     assert (tmp_path / "k.svg").read_text().startswith("<svg")
+    (tmp_path / "folder.svg").mkdir()
+    assert main(["trend", "K_i", "--out", str(tmp_path), "--figure", str(tmp_path / "folder.svg")]) == 3
+    assert (
+        f"--figure {tmp_path / 'folder.svg'}: cannot be written: Is a directory. Next: give another"
+        in capsys.readouterr().err
+    )
     assert main(["trend", "K_i", "--out", str(tmp_path), "--json", "--last", "10"]) == 0
     data = json.loads(capsys.readouterr().out)
     (segment,) = data["segments"]
@@ -273,6 +279,7 @@ def test_the_command_refuses(tmp_path: Path, capsys: pytest.CaptureFixture[str])
         (["K_1"], "the nearest names are K_i"),
         (["K_i", "--rig", "other"], "leave them out"),
         (["K_i", "--figure", "k.png"], "found .png; expected .svg"),
+        (["K_i", "--figure", "nowhere/k.svg"], "found no folder nowhere; expected one that is there"),
         (["K_i", "--seed", "3"], "leave them out"),
     ):
         assert main(["trend", *arguments, "--out", str(tmp_path)]) == 2

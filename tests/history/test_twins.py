@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import sqlite3
 from contextlib import closing
@@ -13,7 +14,8 @@ from hypothesis import strategies as st
 from made_histories import record
 
 from bench.cli.__main__ import main
-from bench.record.records import read_record
+from bench.record.outcomes import Outcome
+from bench.record.records import read_record, write_record
 from bench.record.told import with_unit
 from bench.run import index
 
@@ -86,6 +88,21 @@ def test_what_is_several_machines_is_refused_by_what_tells_them_apart(
     err = told(capsys, "trend", "K_i", "--out", str(twins))[2]
     assert "found 1 run with a value" in err
     assert "follow its twin, which has 4 runs, by --machine served or simulated" in err
+
+
+def test_a_run_without_a_value_is_no_other_machine(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A trial on the served twin that was stopped leaves the trend of the virtual machine as it was."""
+    for k in range(3):
+        record(tmp_path, k, 75.0 + k / 10, seed=3)
+    path = record(tmp_path, 3, 75.0, served=True) / "record.json"
+    stopped = dataclasses.replace(read_record(path), outcome=Outcome.ABORTED)
+    write_record(path, stopped)
+    values, left_out, _ = trend_of(capsys, tmp_path)
+    assert (values, left_out["broken"]) == ([75.0, 75.1, 75.2], 0)
+    write_record(path, dataclasses.replace(stopped, seed=3, visit=9, findings=()))
+    index.rebuild(tmp_path)
+    values, left_out, _ = trend_of(capsys, tmp_path)
+    assert (values, left_out["broken"]) == ([75.0, 75.1, 75.2], 1)
 
 
 def test_a_listing_says_and_chooses_what_each_run_was_made_on(mixed: Path, capsys: pytest.CaptureFixture[str]) -> None:

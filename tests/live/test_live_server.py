@@ -6,6 +6,7 @@ import base64
 import math
 import socket
 from collections.abc import Iterator
+from dataclasses import replace
 from email.message import Message
 from pathlib import Path
 from typing import Any
@@ -15,10 +16,14 @@ import pytest
 from live_client import Client, Page
 from made_run import MadeRun
 
+from bench.clock import WallClock
 from bench.errors import ConfigError
 from bench.live import exchange, site
+from bench.live.buckets import Buckets
 from bench.live.gate import check_host
 from bench.question import Answer, Choice, Question
+from bench.recording.tap import Tap
+from bench.samples import SampleBlock
 
 ASSET, TOKEN = "/index.html", "X-Levbench-Token"
 
@@ -158,6 +163,23 @@ def test_a_page_that_comes_while_a_simulation_stands_still_sees_where(made: Made
         sample = page.wait("samples")
     assert sample["state"] == made.view.states[3]
     assert sample["age_ms"] >= 60_000
+
+
+def test_the_age_of_data_is_that_of_the_controllers(made: MadeRun, own: Client) -> None:
+    """A device that is polled is stamped by the sample clock, here two seconds ahead of the host's."""
+    made.hello()
+    watched = Tap(["controller", "supply"])
+    made.publisher.watch(watched, Buckets(made.view, "controller", 0), real_time=True)
+    with Page(own) as page:
+        page.wait("hello")
+        made.block()  # into the tap that nobody watches any more
+        (came_ns, block) = made.tap._held["controller"].pop()
+        heard_ns, at = WallClock().now_ns() - 100_000_000, np.zeros(1, np.int64)
+        polled = SampleBlock("supply", 0, at.astype(np.uint64), at, heard_ns + 2_000_000_000, 0, {})
+        watched._held["supply"].append((came_ns + 1, polled))
+        watched._held["controller"].append((came_ns, replace(block, host_ns=heard_ns)))
+        sample = page.wait("samples")
+    assert 100 <= sample["age_ms"] < 60_000
 
 
 def test_a_page_that_comes_late_is_told_what_stands(made: MadeRun, own: Client) -> None:
