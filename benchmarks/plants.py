@@ -140,11 +140,13 @@ def run_seed(bed: Bed, seed: int, todo: Sequence[Plant]) -> list[Line]:
 
 def line_of(done: Simulated) -> Line:
     """What a run that reached its end is noted with."""
-    truth = {**done.truth, **truth_of_motion(done)}
     measured = [r for r in done.results if isinstance(r, Measured)]
     codes = {r.code for r in done.results if isinstance(r, Finding) and r.effect is not Effect.NOTE}
     lacking = {q.name for q in done.procedure.measures if q not in done.procedure.optional}
     codes |= {f"no {name}" for name in lacking - {m.quantity.name for m in measured}}
+    if codes:  # no shift is asked of it, and its truth may take longer than the run
+        return {"codes": sorted(codes), "values": {}}
+    truth = {**done.truth, **truth_of_motion(done)}
     values: dict[str, list[float | None]] = {}
     for m in measured:
         name, U = f"{m.quantity.name}@{m.where}", interval(m.estimate, done.seed).U
