@@ -116,6 +116,8 @@ def exciter_hz(y: Array, near: float, tick_s: float) -> float:
     n = len(y)
     hz, power = np.fft.rfftfreq(n, tick_s), np.abs(np.fft.rfft((y - y.mean()) * endless(n)))
     among = np.flatnonzero((hz > SOUGHT[0] * near) & (hz < SOUGHT[1] * near))
+    if not among.size:
+        return near
     t = (np.arange(n) - n / 2) * tick_s
 
     def left(at: float) -> float:
