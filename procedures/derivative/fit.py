@@ -22,7 +22,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import minimize_scalar
 
 from bench.errors import AnalysisError
 
@@ -113,6 +112,8 @@ def exciter_hz(y: Array, near: float, tick_s: float) -> float:
     at the frequency that it takes the exciter for: of one that turns 5 % faster, twelve times the noise is left in the
     position, and a sine of another frequency that is taken out of the record leaves it there.
     """
+    from scipy.optimize import minimize_scalar  # here: what a procedure requires is known without it
+
     n = len(y)
     hz, power = np.fft.rfftfreq(n, tick_s), np.abs(np.fft.rfft((y - y.mean()) * endless(n)))
     among = np.flatnonzero((hz > SOUGHT[0] * near) & (hz < SOUGHT[1] * near))
