@@ -39,7 +39,7 @@ from bench.rigfile import load_rig
 from bench.uncertainty import interval
 
 SURE = 0.95  # of the seeds
-FEW = 10  # seeds that every size is tried on
+FEW = 10  # seeds that every size is tried on, where nobody says
 PLANTED = Path(__file__).with_name("planted")
 Line = dict[str, Any]
 
@@ -140,11 +140,13 @@ def run_seed(bed: Bed, seed: int, todo: Sequence[Plant]) -> list[Line]:
 
 def line_of(done: Simulated) -> Line:
     """What a run that reached its end is noted with."""
-    truth = {**done.truth, **truth_of_motion(done)}
     measured = [r for r in done.results if isinstance(r, Measured)]
     codes = {r.code for r in done.results if isinstance(r, Finding) and r.effect is not Effect.NOTE}
     lacking = {q.name for q in done.procedure.measures if q not in done.procedure.optional}
     codes |= {f"no {name}" for name in lacking - {m.quantity.name for m in measured}}
+    if codes:  # no shift is asked of it, and its truth may take longer than the run
+        return {"codes": sorted(codes), "values": {}}
+    truth = {**done.truth, **truth_of_motion(done)}
     values: dict[str, list[float | None]] = {}
     for m in measured:
         name, U = f"{m.quantity.name}@{m.where}", interval(m.estimate, done.seed).U
@@ -165,13 +167,13 @@ def read(path: Path) -> dict[str, Line]:
     return {line["key"]: line for line in map(json.loads, lines)}
 
 
-def run_all(bed: Bed, seeds: Sequence[int], path: Path, workers: Executor) -> None:
-    """Every size on the first few seeds, then what may be the smallest one caught on the others."""
+def run_all(bed: Bed, seeds: Sequence[int], few: int, path: Path, workers: Executor) -> None:
+    """Every size on the first `few` seeds, then what may be the smallest one caught on the others."""
     path.parent.mkdir(parents=True, exist_ok=True)
     everything = [p for sizes in bed.plants for p in sizes]
-    do(bed, seeds[:FEW], everything, path, workers)
-    for start in range(FEW, len(seeds), FEW):
-        do(bed, seeds[start : start + FEW], edges(bed, len(seeds), read(path)), path, workers)
+    do(bed, seeds[:few], everything, path, workers)
+    for start in range(few, len(seeds), few):
+        do(bed, seeds[start : start + few], edges(bed, len(seeds), read(path)), path, workers)
 
 
 def edges(bed: Bed, many: int, known: Mapping[str, Line]) -> list[Plant]:
@@ -238,6 +240,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("procedures", nargs="*", help="by default every one that has a file")
     parser.add_argument("--seeds", type=int, default=20)
+    parser.add_argument("--few", type=int, default=FEW, help="seeds that every size is tried on")
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--folder", type=Path, default=Path("runs/plants"))
@@ -247,7 +250,7 @@ def main() -> None:
         bed, path = bed_of(procedure), asked.folder / f"{procedure}.jsonl"
         if not asked.table:
             with pool(asked.jobs) as (workers, _):
-                run_all(bed, range(asked.first, asked.first + asked.seeds), path, workers)
+                run_all(bed, range(asked.first, asked.first + asked.seeds), asked.few, path, workers)
         lines = read(path)
         many, sound = len({line["seed"] for line in lines.values()}), [x for x in lines.values() if not x["plant"]]
         loud = [x for x in sound if x["codes"]]

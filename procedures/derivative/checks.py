@@ -75,6 +75,14 @@ def of_result(result: Result, taken: Sequence[Taken], plan: Plan) -> Iterator[Fi
             yield Finding("edge-outside", text, name)
 
 
+def of_exciter(plan: Plan, harmonic_hz: float) -> Iterator[Finding]:
+    """Lines that the plan keeps clear of where the controller takes the exciter to be, and not of where it is."""
+    half = plan.model_copy(update={"clear_hz": plan.clear_hz / 2})
+    for told in lines_clear(half, harmonic_hz):
+        text = f"the exciter turns at {harmonic_hz:.4g} Hz. {told}. Next: move the line, or tell the controller its frequency."
+        yield Finding("line-not-clear", text, "", Effect.INDETERMINATE)
+
+
 def _likeness(t: Taken, plan: Plan) -> str:
     """The estimator of another rule, degree, spacing or equation that explains a capture best, if one does."""
     spacing = round(plan.window_s / t.tick_s)

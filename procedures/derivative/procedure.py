@@ -20,7 +20,7 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.capture import Layout
 from bench.rigfile.roles import STATUS
-from procedures.derivative import checks, estimates
+from procedures.derivative import checks, estimates, fit
 from procedures.derivative import figures as drawn
 from procedures.derivative.estimates import Result
 from procedures.derivative.plan import Plan
@@ -97,10 +97,13 @@ def _take(
 def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     """The estimator's response at each line, and what it is beside that of the weights."""
     plan, taken = recording.plan, read_taken(recording)
-    harmonic_hz = conventions(recording.rig).known(recording.rig, "harmonic_hz")
+    known_hz = conventions(recording.rig).known(recording.rig, "harmonic_hz")
+    quiet = next((t for t in taken if t.kind == QUIET and len(t.y)), None)
+    harmonic_hz = fit.exciter_hz(quiet.y, known_hz, quiet.tick_s) if quiet else known_hz
     findings.gate(checks.of_signals(taken, plan, harmonic_hz))
     result = estimates.evaluate(taken, asked(plan, taken[0].tick_s), plan, harmonic_hz)
     findings.add(checks.of_result(result, taken, plan))
+    findings.add(checks.of_exciter(plan, harmonic_hz))
     return result
 
 

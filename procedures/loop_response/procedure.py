@@ -24,6 +24,7 @@ from bench.rigfile.envelope import Envelope
 from procedures.loop_response import checks, estimates, grid
 from procedures.loop_response import figures as drawn
 from procedures.loop_response.estimates import Result
+from procedures.loop_response.fit import TOP_DEGREE
 from procedures.loop_response.injection import (
     BELOW,
     REFERENCE,
@@ -52,6 +53,7 @@ S_MAX = Quantity("s_max", "1", "greatest |S| of a loop, all others closed (ISO 1
 AT = Quantity("s_max_hz", "Hz", "frequency of the greatest |S|", title="frequency of S_max")
 MEASURES = (BANDWIDTH, IDEAL, S_MAX, AT)
 MARGIN_S = 1e-3  # of a capture
+LEAST_ABOUT = TOP_DEGREE + 2  # lines about the greatest |S|: one more than its curve has terms
 
 
 def step_count(plan: Plan) -> int:
@@ -181,6 +183,9 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     if problems := list(planned.of_parameters(rig, plan.parameters)):
         yield from problems
         return
+    if plan.refined < LEAST_ABOUT and (looked := sensitive(rig, plan)):
+        yield (f"refined: found {plan.refined} lines; expected {LEAST_ABOUT} or more, which the curve about the greatest |S| "
+               f"of {', '.join(looked)} needs")  # fmt: skip
     if plan.high_hz > BELOW * rate(rig, plan):
         most = f"{BELOW * rate(rig, plan):g} or less: {BELOW:g} of the rate of captures"
         yield f"high_hz: found {plan.high_hz:g}; expected {most}"

@@ -75,6 +75,27 @@ def test_places_of_a_known_estimator() -> None:
     )
 
 
+def test_the_exciter_is_found_where_it_is() -> None:
+    """Half a hertz beside a bin, and beside what the controller takes it for; the body that rings by its own noise is none."""
+    rng, t = np.random.default_rng(4), np.arange(20000) * 1e-4
+    noise = 1e-7 * rng.normal(size=20000)
+    y = 3e-6 + 4e-7 * np.sin(2 * np.pi * 42.23 * t + 1) + noise
+    assert fit.exciter_hz(y, 40.0, 1e-4) == pytest.approx(42.23, abs=0.01)
+    k = np.arange(2000) * 1e-4
+    body = 92500 / 300 * 1e-4 * np.exp(-50 * k) * np.sin(300 * k)  # poles -50 +- 300 i
+    for none in (noise - np.convolve(noise, body)[:20000], np.zeros(20000), noise[:100]):
+        assert fit.exciter_hz(none, 40.0, 1e-4) == 40.0
+
+
+def test_an_exciter_that_turns_faster_is_no_noise(tmp_path: Path) -> None:
+    """42 Hz instead of 40: what the compensation leaves of it was taken for noise, 60 U of it."""
+    run = derived(tmp_path, 3, {"harmonic_rate": 84 * np.pi}, lines_hz=(16.3, 53.3))
+    noise = next(m.estimate for m in run.results if isinstance(m, Measured) and m.quantity.name == "noise_gain")
+    assert wrong(run) == {}
+    assert abs(noise.value - truth_of_motion(run)["noise_gain"]) < coverage_factor(7) * noise.u
+    assert coverage_factor(7) * noise.u < 50
+
+
 def test_the_truth_is_recovered(tmp_path: Path) -> None:
     run = derived(tmp_path)
     truth = truth_of_motion(run)
@@ -113,6 +134,12 @@ def test_the_truth_is_recovered(tmp_path: Path) -> None:
         pytest.param({"factor_watched": 0}, "not-this-estimator", "Nor is it any other", {}, marks=pytest.mark.long),
         ({"factor_inject_hz": 1.001}, "line-detuned", "another frequency", {}),
         ({"factor_inject_amplitude": 0}, "no-line", "at the injected line", {}),
+        (
+            {"harmonic_rate": 92 * np.pi},
+            "line-not-clear",
+            "at 46 Hz. lines_hz: found 47.5 Hz",
+            {"lines_hz": (16.3, 47.5)},
+        ),
         pytest.param({"factor_inject_hz": 1.1}, "no-line", "at the injected line", {}, marks=pytest.mark.long),
     ],
 )

@@ -116,6 +116,14 @@ def test_two_planes_hold_one_shaft() -> None:
     assert alone["bandwidth", "x1"] / both["bandwidth", "x1"] == pytest.approx(662 / 623, rel=0.015)
 
 
+def test_the_truth_is_of_the_gains_that_the_firmware_has() -> None:
+    """0.3 of the integral gain that it was told is the loop of one that was told 0.3 of it."""
+    told = load_rig("lira").parameters["ki.b"].default
+    planted = true_loops({"reduced": 1.0, "factor_ki_b": 0.3}, ("x1",))
+    assert planted == true_loops({"reduced": 1.0}, ("x1",), **{"ki.b": 0.3 * told})
+    assert planted != true_loops({"reduced": 1.0}, ("x1",))
+
+
 @pytest.mark.long
 def test_the_reduced_model_is_faster() -> None:
     """Its currents lag more: its bandwidths are not the machine's, and campaigns of them use the full one."""
@@ -169,6 +177,8 @@ def test_refusals() -> None:
     assert procedure.lacking(rig) == ()
     assert list(check(rig, Plan())) == []
     assert "found x9" in next(iter(check(rig, Plan(axes=("x9",)))))
+    assert "refined: found 5 lines; expected 6 or more" in next(iter(check(rig, Plan(axes=("x1",), refined=5))))
+    assert list(check(rig, Plan(axes=("z",), refined=5))) == []
     assert "ref_w" in next(iter(check(rig, Plan(parameters={"ref_w": 1.0}))))
     assert "high_hz" in next(iter(check(rig, Plan(high_hz=12e3))))
     assert "inject_amplitude" in next(iter(check(rig, Plan(axes=("z",), amplitude={"z": 1e3}))))

@@ -63,7 +63,8 @@ class Flying:
         """`whole`: with rounding, too."""
         built = drawn.plant
         params = built.plant if whole else quiet(built.plant) if noise is None else noisy(built.plant)
-        self.plant = Plant(params, noise or 0, control=built.control, reduced=built.reduced)
+        self.plant = Plant(params, noise or 0, control=built.control, reduced=built.reduced, factors=built.factors,
+                           unfed=built.unfed)  # fmt: skip
         self.plant.put(angle=built.rest_angle)
         self.wait(BEAT_S)  # the firmware holds what it has read
         for name in ("idle", "on"):
