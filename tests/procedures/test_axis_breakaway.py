@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from drawn_figures import figures_drawn
 
 from bench.cli.motion_truth import truth_of_motion
 from bench.cli.virtual import simulated_run
@@ -24,7 +25,7 @@ from procedures.axis_breakaway.alone import alone, bearing
 from procedures.axis_breakaway.estimates import Result
 from procedures.axis_breakaway.moves import RAMP
 from procedures.axis_breakaway.plan import Plan
-from procedures.axis_breakaway.procedure import check, figures, procedure, untold
+from procedures.axis_breakaway.procedure import check, procedure, untold
 from procedures.axis_breakaway.sequence import helix, pair, ramp, step_count
 from procedures.axis_breakaway.steps import Ramp
 from procedures.stages.map_bends import doubts
@@ -269,6 +270,4 @@ def test_the_whole_path(tmp_path: Path) -> None:
     assert set(off) == {"breakaway@x", "breakaway_angle@angle", "path_share@helix 1"}
     assert max(map(abs, off.values())) < 2, off
     slid_before_each(done.recording)
-    assert [f.key for f in figures(procedure.evaluated(done.recording).result, done.recording)] == [
-        "circle", "breakaway-x", "beside-x", "breakaway-angle",
-    ]  # fmt: skip
+    assert figures_drawn(done) == ["circle", "breakaway-x", "beside-x", "breakaway-angle"]

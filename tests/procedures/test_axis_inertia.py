@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from drawn_figures import figures_drawn
 
 from bench.cli.motion_truth import truth_of_motion
 from bench.cli.virtual import Simulated, simulated_run
@@ -178,7 +179,7 @@ def test_a_drawn_machine(tmp_path: Path) -> None:
     assert {r.code for r in done.results if isinstance(r, Finding)} == {"map-scale"}
     assert set(off(done)) == {"mass@x", "inertia@angle"}
     assert all(abs(x) < 1.5 for x in off(done).values()), off(done)
-    assert len(list(procedure.figures(procedure.evaluated(done.recording).result, done.recording))) == 2
+    assert len(figures_drawn(done)) == 2
 
 
 @pytest.mark.long

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from drawn_figures import figures_drawn
 
 from bench.cli.motion_truth import truth_of_motion
 from bench.cli.virtual import Simulated, simulated_run
@@ -198,6 +199,7 @@ def test_the_linear_motor(tmp_path: Path) -> None:
     assert {r.code for r in done.results if isinstance(r, Finding)} == {"nameplate-flux"}
     assert set(off(done)) == {"flux@LA", "K_emf@LA", "resistance@LA"}
     assert all(abs(x) < 1.5 for x in off(done).values()), off(done)
+    assert figures_drawn(done)
 
 
 @pytest.mark.long

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from drawn_figures import figures_drawn
 
 from bench.cli.virtual import Simulated, simulated_run
 from bench.findings import Effect, Finding
@@ -58,6 +59,7 @@ def test_the_linear_motor(tmp_path: Path, degrees: float) -> None:
     told = codes(done, notes=True)["zero-off"]
     assert told.where == "LA"
     assert float(told.text.partition("Force is ")[2].partition("%")[0]) == pytest.approx(1.52, abs=0.06)
+    assert figures_drawn(done)
 
 
 @pytest.mark.long

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from drawn_figures import figures_drawn
 from reluctance import SHORT, pulse, taken
 
 from bench.calibration import Calibration
@@ -261,8 +262,7 @@ def test_the_whole_path(tmp_path: Path) -> None:
     assert len(off) == 28
     assert sum(abs(v) > 1 for v in off.values()) <= 3, off
     assert max(map(abs, off.values())) < 2, off
-    shown = list(procedure.figures(procedure.evaluated(done.recording).result, done.recording))
-    assert [f.key for f in shown] == ["inductance", "flux", "parameters"]
+    assert figures_drawn(done) == ["inductance", "flux", "parameters"]
 
 
 def test_refused() -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from balancing import codes, run, values
+from drawn_figures import figures_drawn
 
 from bench.cli.loading import load_procedure
 from bench.cli.motion_truth import truth_of_motion
@@ -75,6 +76,7 @@ def test_the_printed_reduction_on_the_stated_rig(tmp_path: Path) -> None:
         i = interval(m.estimate)
         wide = 2 if name.startswith("error_radius") else 1.5  # the truth's own noise; nanometres
         assert abs(true[name] - (i.low + i.high) / 2) < wide * i.U + 3e-10, name
+    assert figures_drawn(done)
 
 
 @pytest.mark.parametrize(("rig", "seed"), [("tsbs12", 3), ("tsbs12-offset", 5)])

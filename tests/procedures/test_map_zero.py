@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from drawn_figures import figures_drawn
 
 from bench.cli.motion_truth import truth_of_motion
 from bench.cli.virtual import simulated_run
@@ -130,8 +131,7 @@ def test_the_whole_path(tmp_path: Path) -> None:
                 q = 16 / (math.sqrt(1 + (4 / 8.5) ** 2) + 1)
                 assert 0.75 < r.estimate.value / (done.truth["T_c"] / (q * 0.13)) < 1.1
     assert seen == 4
-    shown = list(procedure.figures(procedure.evaluated(done.recording).result, done.recording))
-    assert [f.key for f in shown] == ["alignments", "levels"]
+    assert figures_drawn(done) == ["alignments", "levels"]
 
 
 def test_refused() -> None:

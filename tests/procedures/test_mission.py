@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from drawn_figures import figures_drawn
 
 from bench.cli.motion_truth import truth_of_motion
 from bench.cli.virtual import Flown, Simulated, flown
@@ -55,6 +56,7 @@ def test_a_nominal_rig_flies(sound: Simulated) -> None:
         assert 0 < found[f"peak_reading@{probe}"].estimate.value < 75 * UM
         assert abs(found[f"level_difference@{probe}"].estimate.value) < 0.1 * UM
         assert 18 * UM < found[f"gate_margin@{probe}"].estimate.value < 20 * UM
+    assert figures_drawn(sound)
 
 
 def test_the_gate_passes_a_quarter_of_a_second_after_arrival(sound: Simulated) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from drawn_figures import figures_drawn
 
 from bench.cli.motion_truth import truth_of_motion
 from bench.cli.virtual import Simulated, simulated_run
@@ -126,6 +127,7 @@ def test_the_machine(tmp_path: Path) -> None:
     assert {r.code for r in done.results if isinstance(r, Finding)} == {"margin-cost"}
     assert set(off(done)) == {f"delay@{name}" for name in ("x1", "x2", "y1", "y2")}
     assert all(abs(x) < 2 for x in off(done).values()), off(done)
+    assert figures_drawn(done)
 
 
 @pytest.mark.long

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from drawn_figures import figures_drawn
 from statics import SHORT, Cells, exchanged, taken
 
 from bench.cli.motion_truth import truth_of_motion
@@ -223,10 +224,7 @@ def test_the_whole_path(tmp_path: Path) -> None:
     assert max(map(abs, off.values())) < 2, off
     ratio = next(r.estimate for r in done.results if isinstance(r, Measured) and r.quantity.name == "force_ratio")
     assert abs(ratio.value - 1) < 3 * ratio.u < 0.02
-    assert [f.key for f in procedure.figures(procedure.evaluated(done.recording).result, done.recording)] == [
-        "torque",
-        "force",
-    ]
+    assert figures_drawn(done) == ["torque", "force"]
 
 
 def test_a_cell_that_reads_the_other_way_is_as_uncertain() -> None:
