@@ -9,7 +9,7 @@ READY := .venv/.ready
 # Tests start hundreds of processes: without its bytecode every one of them would compile the project again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test check types bytecode format ci-long faults links browser pictures fuzz campaigns plants sound moved golden former bench clean lock setup wheel site gallery
+.PHONY: demo test check types bytecode format ci-long faults longer links browser pictures fuzz campaigns plants sound moved golden former bench clean lock setup wheel site gallery
 
 demo: setup
 	$(BIN)/bench run amb-calibration --rig tsbs12 --seed 1
@@ -33,7 +33,7 @@ bytecode: setup
 
 # Two workers wait for links in real time first, the third computes and gives way (tests/groups.py). Only files with long tests are read.
 ci-long: setup
-	$(BIN)/python -m pytest -q -m "long and not links" -n 3 --dist loadgroup --durations=60 --durations-min=10 \
+	$(BIN)/python -m pytest -q -m "long and not links and not longer" -n 3 --dist loadgroup --durations=60 --durations-min=10 \
 	    $$(grep -rlE "mark\.(long|faults)" tests --include="test_*.py")
 
 faults: setup
@@ -43,6 +43,10 @@ faults: setup
 # served readings like those that it takes over their limit.
 links: setup
 	$(BIN)/python -m pytest -q -m links tests/links
+
+# More cases of what `make ci-long` shows by a few, and the pages of procedures whose whole path and figures are in tests/procedures.
+longer: setup
+	$(BIN)/python -m pytest -q -m longer -n 2 --dist loadgroup --durations=20
 
 # The live page in Chromium, which has to be installed (Debian: apt-get install chromium), or CHROMIUM=/path/to/it.
 # Pictures of every state to look at lie under build/browser then.
@@ -63,6 +67,7 @@ pictures: setup
 
 fuzz: setup
 	$(BIN)/python -m pytest -q -m "hypothesis and not long and not browser" -n 2 --hypothesis-profile=search --timeout 600
+	$(BIN)/python -m benchmarks.fuzz --inputs 3000000 --seed 1
 
 campaigns: setup
 	$(BIN)/bench campaign tsbs-identification --count 1000 --keep none

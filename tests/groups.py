@@ -37,10 +37,13 @@ COMPUTED = ("tests/links/test_own_controller.py", "tests/links/test_bound_rig.py
 PAGES = "tests/test_docs.py::test_commands_work"
 """Long tests of one file that share nothing: each goes to whichever worker is free."""
 
-FIRST = (REAL_TIME, PATIENT, f"{PAGES}[loop-response]", "tests/test_described.py", "tests/test_machines.py",
-         "tests/procedures/test_maximum_speed.py", "tests/procedures/test_coverage_long.py",
-         "tests/procedures/test_moved_long.py", "tests/procedures/test_bearing_constant.py",
-         "tests/procedures/test_load_response_run.py")  # fmt: skip
+FIRST = (REAL_TIME, PATIENT, "tests/test_machines.py", "tests/procedures/test_loop_response.py",
+         "tests/procedures/test_coverage_long.py", "tests/procedures/test_coil_map.py", "tests/test_described.py",
+         "tests/test_renamed_rigs.py", "tests/live/test_live_requests.py", "tests/procedures/test_moved_long.py",
+         "tests/procedures/test_maximum_speed.py", "tests/procedures/test_estimator_compare.py", "tests/test_wheel.py",
+         "tests/procedures/test_load_response_run.py", "tests/test_docs.py", f"{PAGES}[model]", "tests/test_honest_hour.py",
+         "tests/cli/test_example_package.py", "tests/procedures/test_bearing_constant.py",
+         "tests/cli/test_campaign_dask.py", "tests/test_golden_numbers.py", f"{PAGES}[lira]")  # fmt: skip
 """What takes longest is handed out first, or one worker ends long after the others."""
 NICE = 10  # of workers that only compute: those that must keep up with wall time find a free processor whenever they need one
 

@@ -37,7 +37,7 @@ def from_another_end_and_mark(table: Table) -> None:
 
 SAME, ANEW = 0.25, 2.3  # of U: the same noise in the same order; each its own, 3.3 standard deviations of a difference
 SIGNED = ("vector_cos", "vector_sin", "influence_cos", "influence_sin", "offset")  # by the way that an axis counts
-LONG = pytest.mark.long
+LONG, LONGER = pytest.mark.long, pytest.mark.longer
 
 
 @pytest.mark.parametrize(("rig", "bearing"), [(SPINDLE, "upper"), (STAND, "hinten")], ids=["spindle", "stand"])
@@ -63,11 +63,11 @@ def results(procedure: str, rig: str, plan: dict[str, Any], path: Path) -> tuple
     ("rig", "bearing", "procedure", "plan"),
     [
         (SPINDLE, "upper", "unbalance", SHORT),
-        (SPINDLE, "upper", "step", {"axes": ["y", "z"]}),
-        (SPINDLE, "upper", "balance", {}),
+        pytest.param(SPINDLE, "upper", "step", {"axes": ["y", "z"]}, marks=LONGER),
+        pytest.param(SPINDLE, "upper", "balance", {}, marks=LONGER),
         (SPINDLE, "upper", "run-up", {}),
-        (SPINDLE, "upper", "coast-down", {}),
-        (STAND, "vorn", "step", {"axes": ["y"]}),
+        pytest.param(SPINDLE, "upper", "coast-down", {}, marks=LONGER),
+        pytest.param(STAND, "vorn", "step", {"axes": ["y"]}, marks=LONGER),
         (STAND, "hinten", "bearing-model", {}),
         (STAND, "hinten", "amb-calibration", {}),
     ],

@@ -1,7 +1,8 @@
 """The console blocks of the documentation, executed page by page, in order, in a folder of their own.
 
-The default run executes the guides that are quick and one page of each machine; every other page is `LONG`. Commands,
-options and plans of all pages are checked there, without starting one.
+The default run executes the guides that are quick and pages of each machine, `make ci-long` those that are `LONG`, and
+`make longer` what only runs a procedure whose figures are `DRAWN` elsewhere. Commands, options and plans of all pages are
+checked by default, without starting one.
 
 Pages of procedures that build on others begin with the same runs and adoptions. What such a sequence of commands leaves in a
 fresh folder is kept for the session: the next page with the same beginning goes on from a copy. Every distinct sequence
@@ -50,20 +51,26 @@ COPIED = ("bench", "drivers", "procedures", "reports", "sim_backend", "rigs", "s
 
 
 LONG = (
-    "actuator-constant", "add-a-device", "adopt-a-calibration", "amb-calibration", "angle-step", "axis-breakaway", "balance",
-    "bearing-constant", "bearing-model", "change-a-plan", "coast-down", "coil-map", "compare", "compensation", "connect-a-rig",
-    "current-step", "first-calibration", "force-constant",
-    "force-coupling", "force-map", "inject-faults", "lift-off", "maximum-speed", "model", "negative-stiffness",
-    "run-a-campaign", "run-up", "sensitivity", "slew", "spindown", "step", "torque-constant", "tracking", "trend", "unbalance",
-    "use-in-ci", "watch-a-run",
+    "add-a-device", "adopt-a-calibration", "change-a-plan", "compare", "connect-a-rig", "first-calibration", "inject-faults",
+    "lift-off", "maximum-speed", "model", "run-a-campaign", "trend", "use-in-ci", "watch-a-run",
 )  # fmt: skip
-"""Pages that take long, or that only run a procedure: by default `tests/procedures` takes each through its whole path and
-draws its figures, and `tests/cli` the same commands with their reports and calibrations."""
+"""Pages that take long."""
+DRAWN = (
+    "actuator-constant", "amb-calibration", "angle-step", "axis-breakaway", "axis-friction", "axis-inertia", "balance",
+    "bearing-constant", "bearing-model", "coast-down", "cogging-map", "coil-map", "compensation", "current-step",
+    "emf-constant", "encoder-zero", "estimator-compare", "force-constant", "force-coupling", "force-map", "gate-margin",
+    "inductance-map", "load-balancing", "load-response", "loop-response", "map-zero", "mission", "negative-stiffness",
+    "positioning", "pull-ratio", "run-up", "runout-map", "sensitivity", "sensor-delay", "sine-following", "slew", "spindown",
+    "static-characteristics", "step", "step-following", "torque-constant", "tracking", "unbalance", "unstable-pole",
+)  # fmt: skip
+"""Pages that only run a procedure. `tests/procedures` takes each through its whole path, and draws the figures that the page's
+report would have; `make longer` executes the commands themselves."""
 
 
 def test_there_are_pages_to_execute() -> None:
     assert len(PAGES) >= 4
-    assert {*LONG} <= {page.stem for page in PAGES}
+    assert {*LONG, *DRAWN} <= {page.stem for page in PAGES}
+    assert not {*LONG} & {*DRAWN}
 
 
 def commands(page: Path) -> tuple[tuple[str, ...], list[str]]:
@@ -129,7 +136,14 @@ def chains(tmp_path_factory: pytest.TempPathFactory) -> Chains:
 
 
 def case(page: Path) -> Any:
-    return pytest.param(page, id=page.stem, marks=[pytest.mark.long] if page.stem in LONG else [])
+    marks = (
+        [pytest.mark.long]
+        if page.stem in LONG
+        else [pytest.mark.long, pytest.mark.longer]
+        if page.stem in DRAWN
+        else []
+    )
+    return pytest.param(page, id=page.stem, marks=marks)
 
 
 @pytest.mark.timeout(600)

@@ -34,6 +34,7 @@ TURNED = """zero_at = "the terminal box"
 up = { value = 30, unit = "deg", half_width = 0, distribution = "rectangular", source = "by definition" }
 """
 LONG = pytest.mark.long
+LONGER = (pytest.mark.long, pytest.mark.longer)
 ALONE: tuple[Mapping[str, Any], ...] = (
     {"bearings": "plan", "speeds_rad_s": [418.9]},
     {"axes": ["yi"], "speeds_rad_s": [0]},
@@ -105,12 +106,12 @@ def test_no_old_name_is_left(rig: str, tmp_path: Path) -> None:
     [
         ("tsbs12", "spindown", {}),
         ("amb5dof", "tracking", {}),
-        pytest.param("amb5dof", "bearing-model", {}, marks=LONG),
-        pytest.param("amb5dof", "step", {"axes": ["y", "x"]}, marks=LONG),
+        pytest.param("amb5dof", "bearing-model", {}, marks=LONGER),
+        pytest.param("amb5dof", "step", {"axes": ["y", "x"]}, marks=LONGER),
         pytest.param("amb5dof", "unbalance", ALONE[0], marks=LONG),
-        pytest.param("amb5dof", "compensation", ALONE[0], marks=LONG),
-        pytest.param("amb5dof", "run-up", {"bearings": "plan"}, marks=LONG),
-        pytest.param("amb5dof", "coast-down", {"bearings": "plan"}, marks=LONG),
+        pytest.param("amb5dof", "compensation", ALONE[0], marks=LONGER),
+        pytest.param("amb5dof", "run-up", {"bearings": "plan"}, marks=LONGER),
+        pytest.param("amb5dof", "coast-down", {"bearings": "plan"}, marks=LONGER),
         pytest.param("amb5dof", "balance", {"bearings": "plan"}, marks=LONG),
         pytest.param("amb5dof", "sensitivity", ALONE[1], marks=LONG),
     ],

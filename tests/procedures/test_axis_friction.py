@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from drawn_figures import figures_drawn
 
 from bench.cli.motion_truth import truth_of_motion
 from bench.cli.virtual import Simulated, simulated_run
@@ -21,7 +22,7 @@ from bench.uncertainty import interval
 from procedures.axis_friction import checks, estimates, fit
 from procedures.axis_friction.estimates import RADIUS, Result
 from procedures.axis_friction.plan import Plan
-from procedures.axis_friction.procedure import check, figures, procedure, untold
+from procedures.axis_friction.procedure import check, procedure, untold
 from procedures.axis_friction.sequence import chosen, ends, lead, loads, rates, start, step_count, window
 from procedures.axis_friction.steps import Pass
 from procedures.stages.map_bends import doubts
@@ -214,8 +215,7 @@ def test_a_drawn_machine(tmp_path: Path) -> None:
     assert {r.code for r in done.results if isinstance(r, Finding)} == {"force-scale"}
     assert len(off(done)) == 7
     assert all(abs(x) < 1.5 for x in off(done).values()), off(done)
-    drawn = list(figures(procedure.evaluated(done.recording).result, done.recording))
-    assert [f.key for f in drawn] == ["friction-x", "friction-angle", "helix"]
+    assert figures_drawn(done) == ["friction-x", "friction-angle", "helix"]
 
 
 def test_a_single_axis(tmp_path: Path) -> None:
@@ -225,7 +225,13 @@ def test_a_single_axis(tmp_path: Path) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("planted", [{"along_path": 0.0}, {"brake_x": 0.8}, {"brake_angle": 6e-3}])
+@pytest.mark.parametrize(
+    "planted",
+    [
+        {"along_path": 0.0},
+        *(pytest.param(p, marks=pytest.mark.longer) for p in ({"brake_x": 0.8}, {"brake_angle": 6e-3})),
+    ],
+)
 def test_planted_friction(tmp_path: Path, planted: Mapping[str, float]) -> None:
     done = run(tmp_path, 5, planted)
     assert "axes-rub-apart" in loud({r.code: r for r in done.results if isinstance(r, Finding)})

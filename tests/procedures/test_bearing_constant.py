@@ -221,7 +221,7 @@ def test_the_truth_is_recovered(tmp_path: Path) -> None:
     ("truth", "code"),
     [({"misplaced": 3.0}, "visits-disagree"),
      pytest.param({"places_exchanged": 1.0}, "weight-misplaced", marks=pytest.mark.long),
-     pytest.param({"mass_error_M1": 0.02}, "masses-disagree", marks=pytest.mark.long)],
+     pytest.param({"mass_error_M1": 0.02}, "masses-disagree", marks=[pytest.mark.long, pytest.mark.longer])],
 )  # fmt: skip
 def test_what_is_planted_is_found(tmp_path: Path, truth: dict[str, float], code: str) -> None:
     assert code in codes(run(tmp_path, truth, average_s=0.2))

@@ -136,13 +136,13 @@ def test_a_circle_narrower_than_its_lines_is_told_or_said_to_be_hidden(
         loop = _rigid(hz) + _mode(hz, at, gain, damping)
         fine = np.linspace(at * (1 - 6 * damping), at * (1 + 6 * damping), 4001)
         true = 1 / rise(_rigid(fine) + _mode(fine, at, gain, damping))
-        for seed in range(8):
+        for seed in range(4):
             taken = _taken(loop, hz, noise, seed)
             told = of_mode(taken)
             if told is not None:
                 assert abs(told[0] - true) < 4 * told[1]
             quiet += told is None and not hides(taken, 0.2, UNEXPLAINED)
-    assert quiet <= 2  # of 24; the narrowest under the greatest noise
+    assert quiet <= 1  # of 12; the narrowest under the greatest noise
 
 
 def test_lines_without_a_circle_hide_none() -> None:

@@ -107,7 +107,9 @@ def test_filters_that_are_swapped_lose_the_body(tmp_path: Path) -> None:
 
 @pytest.mark.long
 @pytest.mark.timeout(300)
-@pytest.mark.parametrize("seed", range(20, 32))
+@pytest.mark.parametrize(
+    "seed", [*range(20, 24), *(pytest.param(seed, marks=pytest.mark.longer) for seed in range(24, 32))]
+)
 def test_the_ratios_of_the_thesis_on_drawn_stands(tmp_path: Path, seed: int) -> None:
     """B2 by 2.5 times with its interval, B3 1.65 to 1.85 and 1.5 to 2.0, on each stand."""
     run = compared(tmp_path, seed, repeats=6)

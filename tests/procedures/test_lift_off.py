@@ -238,7 +238,7 @@ def test_the_printed_order_on_the_nominal_stand(tmp_path: Path) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", [0, 1, 3, *(pytest.param(seed, marks=pytest.mark.longer) for seed in (2, 4, 5))])
 def test_drawn_stands_end_as_their_own_prediction_says(tmp_path: Path, seed: int) -> None:
     known = facts_of("tsbs12-close", seed, tmp_path)
     run = simulated_run(NAME, "tsbs12-close", seed, QUICK, tmp_path / "o.mcap", None, known)

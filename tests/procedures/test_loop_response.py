@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from drawn_figures import figures_drawn
 from scipy.linalg import expm
 
 from bench.cli.motion_truth import truth_of_motion
@@ -54,7 +55,8 @@ def true_loops(
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("observer", "bearing", "rotary", "linear", "s_max"), [(1.0, 623, 94, 148, 5.2), (2.0, 900, 93, 144, None)]
+    ("observer", "bearing", "rotary", "linear", "s_max"),
+    [(1.0, 623, 94, 148, 5.2), pytest.param(2.0, 900, 93, 144, None, marks=pytest.mark.longer)],
 )
 def test_the_nominal_machine(
     observer: float, bearing: float, rotary: float, linear: float, s_max: float | None
@@ -125,6 +127,7 @@ def test_the_truth_is_of_the_gains_that_the_firmware_has() -> None:
 
 
 @pytest.mark.long
+@pytest.mark.longer
 def test_the_reduced_model_is_faster() -> None:
     """Its currents lag more: its bandwidths are not the machine's, and campaigns of them use the full one."""
     axes = ("x1", "gamma", "z")
@@ -148,6 +151,7 @@ def test_a_drawn_machine_is_within_its_intervals(tmp_path: Path) -> None:
         half = (i.high - i.low) / 2
         assert abs(m.estimate.value - true[name]) < 2 * half, name
         assert half < 0.03 * m.estimate.value, name
+    assert figures_drawn(done)
 
 
 def test_a_loop_at_its_limit_is_told(tmp_path: Path) -> None:

@@ -1,4 +1,5 @@
-"""The fuzz target itself: a short run over every decoder, a longer one, and that it finds what it should."""
+"""The fuzz target itself: a short run over every decoder, a longer one (`make fuzz` has three times as many inputs),
+and that it finds what it should."""
 
 from __future__ import annotations
 
@@ -23,7 +24,7 @@ def test_short(name: str) -> None:
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize("name", sorted(TARGETS))
 def test_long(name: str) -> None:
-    assert fuzz(name, 3_000_000, seed=1).findings == []
+    assert fuzz(name, 1_000_000, seed=1).findings == []
 
 
 def test_a_crc_that_is_not_checked_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
