@@ -105,7 +105,7 @@ def listening(folder: Path, url: str) -> Callable[[], list[tuple[float, float]]]
 def test_procedures_over_the_command_line(tmp_path: Path, rig_name: str, procedure: str, plan: tuple[str, ...]) -> None:
     """Each against a served rig, as processes: what is measured holds what the machine was drawn with."""
     arguments = tuple(x for one in plan for x in ("--plan", one))
-    reduced = int(procedure in ("gate-margin", "pull-ratio", "sensor-delay"))  # which no current loop matters to
+    reduced = int(procedure not in ("current-step", "coil-map", "loop-response"))  # which the current loops matter to
     with processes.served(tmp_path, "--seed", "3", "--truth", f"reduced={reduced}", rig=rig_name, ports=PORTS) as rig:
         with processes.real_bench(
             tmp_path, "run", procedure, "--rig", rig_name, "--backend", "live", "--operator", "auto", "--no-report",
