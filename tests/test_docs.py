@@ -71,6 +71,7 @@ def test_there_are_pages_to_execute() -> None:
     assert len(PAGES) >= 4
     assert {*LONG, *DRAWN} <= {page.stem for page in PAGES}
     assert not {*LONG} & {*DRAWN}
+    assert {*DRAWN} <= {entry.name for entry in catalogue.PROCEDURES}
 
 
 def commands(page: Path) -> tuple[tuple[str, ...], list[str]]:
