@@ -137,6 +137,7 @@ def test_the_reduced_model_is_faster() -> None:
 
 
 @pytest.mark.long
+@pytest.mark.timeout(300)
 def test_a_drawn_machine_is_within_its_intervals(tmp_path: Path) -> None:
     done = run(tmp_path, axes=("x1", "z"), refined=9)
     assert wrong(done) == {}
