@@ -205,7 +205,7 @@ def _placed(each: Array, longest: int, either_way: bool) -> tuple[int, Array]:
     lies beside the top is c/2 (s_b/c)^2 = 3 s/(8 FALL sqrt(m)) lower: 0.035 of the value's 1.06 s/sqrt(m)."""
     mean = each.mean(axis=0)
     noise = float(np.sqrt(each.var(axis=0, ddof=1).mean() / len(each)))
-    for m in range(1, longest + 1):
+    for m in range(1, min(longest, (len(mean) - 1) // 2) + 1):
         fits = _parabola(m)
         levels = np.lib.stride_tricks.sliding_window_view(mean, 2 * m + 1) @ fits[0]
         first = int(np.argmax(np.abs(levels) if either_way else levels))

@@ -95,6 +95,10 @@ def test_the_greatest_of_noise_is_none() -> None:
     assert all(0 < top.above < 2 for top in found)
     bump = np.sin(np.linspace(0, np.pi, 200)) * -5
     assert fit.farthest(bump + rng.normal(0, 0.1, (10, 200)), 12, True).value == pytest.approx(5, abs=0.05)
+    few = np.array([0.0, 1, 2, 1, 0]) + np.array([[0.5], [0.5], [-0.5], [-0.5]])
+    assert fit.farthest(few, 12).value == pytest.approx(
+        (2 * 12 * 1 + 17 * 2) / 35
+    )  # the parabola of all five, and no more
 
 
 @pytest.mark.parametrize(("damping", "noise"), [(0.3, 5e-3), (0.6, 1.7e-3), (0.6, 2e-2), (0.8, 5e-3)])
