@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from typing import Any
 
 import pytest
 
@@ -133,6 +134,22 @@ def test_a_rate_that_nothing_tells_is_said() -> None:
     assert told(5.5, 10**9) == []
     assert told(6.5) == told(6.5, 19_000_000) == [("clock-unknown", Effect.NOTE)]
     assert told(6.5, 21_000_000) == told(6.5, 0, BEYOND) == [("clock-drift", Effect.INDETERMINATE)]
+
+
+def test_a_simulated_controller_that_catches_up_has_no_wrong_clock() -> None:
+    """Its ticks are right by definition; what falls behind slides steps along samples, and is its computer's doing."""
+
+    def told(**of: Any) -> list[tuple[str, Effect, str]]:
+        found = Health(Counters(), CLEAN, of.pop("drift", None), 0, simulated=True, **of).findings()
+        return [(f.code, f.effect, f.text) for f in found]
+
+    ((code, effect, _),) = told(unknown_s=13.0, gained_ns=335_000_000)
+    assert (code, effect) == ("clock-unknown", Effect.NOTE)
+    for of in ({"unknown_s": 13.0, "beyond_drift": BEYOND}, {"drift": Drift(260.0, 50.0, 60)}):
+        ((code, effect, text),) = told(**of)
+        assert (code, effect) == ("clock-drift", Effect.INDETERMINATE)
+        assert "computer that serves it does not keep up" in text
+        assert "crystal" not in text
 
 
 @pytest.mark.parametrize(("ppm", "rate"), [(1e6, "0.500"), (-5e5, "2.000"), (-19_608.0, "1.020")])

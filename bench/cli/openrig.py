@@ -53,7 +53,8 @@ def rig_of(
                       controller.watch.host_age_s, controller.requests.round_trip_ns, others,
                       repeats=controller.requests.repeats, cut_ns=controller.cut_ns, beyond_drift=telemetry.host.beyond,
                       unknown_s=telemetry.host.unknown_s, gained_ns=telemetry.host.rate.gained_ns,
-                      replies_wrong_length=controller.requests.wrong_length, stuck=controller.watch.stuck.found)  # fmt: skip
+                      replies_wrong_length=controller.requests.wrong_length, simulated=controller.watch.simulated,
+                      stuck=controller.watch.stuck.found)  # fmt: skip
 
     rig = Rig(controller.rig, controller.clock, controller, controller.rotation, operators[0], controller.telemetry.counters,
               health, controller.link.close, bus.drive, bus.supply, bus.thermal, controller.capture,

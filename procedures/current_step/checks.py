@@ -43,7 +43,7 @@ def _stepped(mine: Sequence[Taken], kind: str, place: str, plan: Plan) -> Iterat
         yield Finding("current-not-stepped", text, place, Effect.ERROR)
         return
     both = [e for pair in found if pair is not None for e in pair]
-    size = float(np.mean([abs(e.size) for e in both])) / abs(mine[0].size) - 1
+    size = float(np.mean([abs(e.end - e.before) for e in both])) / abs(mine[0].size) - 1
     drift = float(np.mean([e.drift / e.size for e in both]))
     if abs(size) > LIKE:
         text = f"the {kind} step is off its {mine[0].size:g} A by {size:+.1%}: another step came than was told."

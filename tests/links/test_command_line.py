@@ -100,7 +100,8 @@ def listening(folder: Path, url: str) -> Callable[[], list[tuple[float, float]]]
      ("lira", "sensor-delay", ("lines=3", "record_s=0.3")),
      ("lira", "gate-margin", ("places_m=[0.008]", "angles_rad=[-1.5, 1.5]")),
      ("lira", "pull-ratio", ("levels_m=[-2e-5, 0.0, 2e-5]", "settle_s=0.6")),  # by the host's clock: the rig may be behind
-     ("lira", "actuator-constant", ('loops="along"', "lines=5", "pairs=3"))],
+     ("lira", "actuator-constant", ('loops="along"', "lines=5", "pairs=3")),
+     ("lira", "emf-constant", ("motors=['LA']",))],
 )  # fmt: skip
 def test_procedures_over_the_command_line(tmp_path: Path, rig_name: str, procedure: str, plan: tuple[str, ...]) -> None:
     """Each against a served rig, as processes: what is measured holds what the machine was drawn with."""

@@ -106,6 +106,11 @@ def bandwidth(h: Array) -> float:
     return float(brentq(lambda f: gain(f) - MINUS_3_DB, hz[k - 1], hz[k]))
 
 
+def _greatest(h: Array) -> float:
+    """Of the spline through a response (n,), also between two ticks."""
+    return float(CubicSpline(np.arange(len(h)), h)(np.arange(0, len(h) - 1, 0.05)).max())
+
+
 def _half(h: Array) -> int:
     """The first tick beyond the half of a response."""
     return int(np.argmax(h >= 0.5))
@@ -128,10 +133,11 @@ def currents(rig: RigFile, drawn: Truth, asked: CurrentAsked) -> Mapping[tuple[s
         small = stepped.step(name, asked.small)[0] / asked.small
         stepped.step(name, 0.0)
         time = rise(along)
+        shown = across[: _half(along) + round(3 * time * TICKS_S)]
         out |= {
             ("rise_time", place): time, ("rise_bandwidth", place): 1 / (3 * time), ("fall_time", place): rise(back),
-            ("overshoot", place): max(float(along[:count].max()) - 1, 0.0),
-            ("across", place): float(np.abs(across[: _half(along) + round(3 * time * TICKS_S)]).max()),
+            ("overshoot", place): max(_greatest(along[:count]) - 1, 0.0),
+            ("across", place): max(_greatest(x) for x in (shown, -shown)),
             ("bandwidth_small", place): bandwidth(small),
         }  # fmt: skip
         if (inductance := _inductance(built.plant, name)) and place in asked.gains:
