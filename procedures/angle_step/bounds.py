@@ -57,7 +57,7 @@ class Swing:
     @property
     def whole(self) -> bool:
         """Whether segments are told as vectors, q and d."""
-        return self.vectors.shape[1] == 2
+        return bool(self.vectors.shape[1] == 2)
 
     @property
     def bound(self) -> Array:
