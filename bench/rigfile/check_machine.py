@@ -128,7 +128,9 @@ def _named(rig: RigFile) -> Iterator[Found]:
     yield from ((f"probes.{p}.channel", probe.channel, "m") for p, probe in rig.probes.items())
     for m, motor in rig.motors.items():
         yield from ((f"motors.{m}.currents", name, "A") for name in motor.currents)
-        yield from ((f"motors.{m}.asked.{key}", name, "A") for key, name in motor.asked.items())
+        yield from (
+            (f"motors.{m}.asked.{key}", name, "1" if key == "share" else "A") for key, name in motor.asked.items()
+        )
     for e, encoder in rig.encoders.items():
         yield f"encoders.{e}.channel", encoder.channel, "rad" if encoder.measures == "angle" else "m"
     if rig.mark is not None:

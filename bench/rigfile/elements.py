@@ -175,14 +175,14 @@ class Motor(Part):
     """What gives torque, and perhaps force. `currents` are the channels of its segments or phases, the first at `direction`:
     of each segment in turn the `components` of its current, q along the field and d across it. `asked`: what its controller can
     record of the currents that its law asks for, which give force along the first segment, across it (a right angle clockwise),
-    and torque."""
+    and torque; and where amplitudes share the torque, how much of it those along have, T (6.19)."""
 
     kind: str
     at: Place | None = None
     direction: Direction | None = None
     currents: tuple[str, ...] = ()
     components: tuple[Literal["q", "d"], ...] = Field(("q",), min_length=1, max_length=2)
-    asked: Mapping[Literal["along", "across", "torque"], str] = {}
+    asked: Mapping[Literal["along", "across", "torque", "share"], str] = {}
     gives: tuple[Literal["torque", "radial force", "axial force"], ...] = ("torque",)
     pole_pairs: Number | None = None
     stiffness: Number | None = None

@@ -1,4 +1,5 @@
-"""Currents at the controller's full rate during a step: whether torque stays within what force leaves, and segments within I_s.
+"""Currents at the controller's full rate during a step: how long an amplifier cuts what the law asks for, whether torque stays
+within what force leaves, and segments within I_s.
 
 Of a motor whose segments carry vectors, q along the field and d across it, force asks i_x, i_y and T (7.18), put right, leaves
 
@@ -30,6 +31,7 @@ from procedures.shared.certificates import certified_sensors
 
 Array = npt.NDArray[np.float64]
 ASKED = ("across", "along", "torque")
+SHARE = "share"
 POSITIONS = ("xi", "yi", "xo", "yo")
 CAPTURED_S = 0.4
 ROUNDING_A = 10 * 2**-23  # of what the law tells, single precision: no cut is seen in less
@@ -37,10 +39,11 @@ ROUNDING_A = 10 * 2**-23  # of what the law tells, single precision: no cut is s
 
 @dataclass(frozen=True)
 class Swing:
-    """A captured step: `t` (n,) s, `asked` i_x, i_y, i_theta of the law, each (n,) A, or nothing where it does not tell them;
-    `vectors` (k, c, n) A: q and d of each segment as their sensors read, or its amplitude; `limit` I_s, A; `angle` (n,) rad as
-    the encoder tells it; `orbit` and `motor` (2, n) m off the sensors' zero, at the outboard sensor and at the motor; `spread`:
-    the latter's noise over that of one sensor."""
+    """A captured step: `t` (n,) s, `asked` i_x, i_y, i_theta of the law, each (n,) A, with the share of the torque that the
+    segments along have where amplitudes share it, or nothing where it does not tell them; `vectors` (k, c, n) A: q and d of
+    each segment as their sensors read, or its amplitude; `limit` I_s, A; `angle` (n,) rad as the encoder tells it; `orbit` and
+    `motor` (2, n) m off the sensors' zero, at the outboard sensor and at the motor; `spread`: the latter's noise over that of
+    one sensor."""
 
     t: Array
     asked: Mapping[str, Array]
@@ -50,6 +53,11 @@ class Swing:
     orbit: Array
     motor: Array
     spread: float
+
+    @property
+    def whole(self) -> bool:
+        """Whether segments are told as vectors, q and d."""
+        return bool(self.vectors.shape[1] == 2)
 
     @property
     def bound(self) -> Array:
@@ -64,12 +72,20 @@ class Swing:
 
     @property
     def cut(self) -> float | None:
-        """How long the law asks a segment for more than its limit, s, which its amplifier cuts: q is i_theta +- i_y, d is i_x,
-        T (7.12); None where it does not tell."""
+        """How long the law asks a segment for more than its limit, s, which its amplifier cuts; None where it does not tell."""
         if not self.asked:
             return None
-        most = np.hypot(np.abs(self.asked["torque"]) + np.abs(self.asked["along"]), self.asked["across"])
-        return float((most > self.limit + 3 * ROUNDING_A).sum() * self.t[1])
+        return float((self._most > self.limit + 3 * ROUNDING_A).sum() * self.t[1])
+
+    @property
+    def _most(self) -> Array:
+        """The greatest amplitude that the law asks a segment for, (n,) A: q is i_theta +- i_y, d is i_x, T (7.12); or by T
+        (6.19) 2 lambda i_theta +- i_y and 2 (1 - lambda) i_theta +- i_x."""
+        x, y, torque = (np.abs(self.asked[key]) for key in ASKED)
+        if self.whole:
+            return np.asarray(np.hypot(torque + y, x))
+        share = self.asked[SHARE]
+        return np.asarray(np.maximum(2 * share * torque + y, 2 * (1 - share) * torque + x))
 
     @property
     def excess(self) -> float:
@@ -95,20 +111,25 @@ def bound(i_x: Array, i_y: Array, limit: float) -> Array:
 
 
 def captured(rig: RigFile) -> tuple[str, ...]:
-    """What is captured of a step: segments, positions and angle, with what the law asks for where that is bounded by vectors;
-    nothing where the controller does not record them."""
+    """What is captured of a step: segments, positions and angle, with what the law asks for where it tells that; nothing where
+    the controller does not record them."""
     machine = conventions(rig)
-    asked = tuple(machine.asked[key] for key in ASKED) if bounded(rig) else ()
-    names = (*machine.segments, *asked, *machine.positions_of(*POSITIONS), *resolved(rig, [ANGLE]))
+    names = (*machine.segments, *told(rig).values(), *machine.positions_of(*POSITIONS), *resolved(rig, [ANGLE]))
     known = () if rig.capture is None else tuple(rig.capture.channels)
     return names if set(names) <= set(known) else ()
 
 
 def bounded(rig: RigFile) -> bool:
     """Whether segments carry vectors, and what the law asks for is recorded: then torque shows its bound."""
+    return conventions(rig).components == 2 and bool(told(rig))
+
+
+def told(rig: RigFile) -> dict[str, str]:
+    """Channels of what the law asks for by what they are; nothing where one is not recorded."""
     machine = conventions(rig)
+    keys = ASKED if machine.components == 2 else (*ASKED, SHARE)
     known = () if rig.capture is None else tuple(rig.capture.channels)
-    return machine.components == 2 and all(machine.asked.get(key) in known for key in ASKED)
+    return {key: machine.asked[key] for key in keys} if all(machine.asked.get(key) in known for key in keys) else {}
 
 
 def read_swing(recording: Recording[Any], number: object) -> Swing | None:
@@ -129,7 +150,7 @@ def read_swing(recording: Recording[Any], number: object) -> Swing | None:
     share = machine.sensor_share(rig.geometry["com_to_motor"].value, rig)
     return Swing(
         np.arange(len(data[names[0]])) / found[0].rate_hz,
-        {key: data[machine.asked[key]] for key in ASKED} if bounded(recording.rig) else {},
+        {key: data[channel] for key, channel in told(rig).items()},
         np.array([[data[c] for c in pair] for pair in machine.vectors]),
         stated(rig, "motor.segment_limit").default,
         np.unwrap(data[resolved(rig, [ANGLE])[0]]),

@@ -28,12 +28,6 @@ def within(identity: str, name: str, half: float, unit: str) -> Estimate:
     return Estimate.of(0.0, influence)
 
 
-def sampled(identity: str, period: float, count: int) -> Estimate:
-    """Zero, with what a mean of so many times is off, each of which is known to a sample, s."""
-    u = period / math.sqrt(12 * count)
-    return Estimate.of(0.0, Influence(id=identity, name="sampling", u=u, unit="s", kind="B", distribution="normal"))
-
-
 def gained(
     peaks: Iterable[tuple[float, Array]], shares: Mapping[str, float], gains: Mapping[str, Estimate]
 ) -> Estimate:

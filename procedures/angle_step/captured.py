@@ -31,7 +31,7 @@ from procedures.shared.certificates import certified_gain
 
 Array = npt.NDArray[np.float64]
 TICKS = 0.1  # of a tick: a crossing, where steps that are alike meet the same ticks
-BETWEEN = 0.009  # of a count: what a turning point is off in all steps of one way (simulated swings)
+BETWEEN = 0.004  # of a count: what turning points are off in all steps alike, both ways (at 2 degrees; further on none is seen)
 
 
 def by_case(
@@ -66,7 +66,7 @@ def _estimates(
     tick = float(swings[0].t[1])
     between = _read(f"edges/{where}", "encoder between its counts",
                     max(f.course.unsure(BETWEEN, count) for f in found), "rad")  # fmt: skip
-    crossings = _read(f"ticks/{where}", "sampling", tick * TICKS, "s")
+    crossings = _read(f"ticks/{where}", "sampling", tick * TICKS / math.sqrt(2), "s")
     tops = _ways(found, [f.overshoot for f in found])
     starts = _ways(found, [f.began.edge for f in found])
     higher = (
@@ -88,10 +88,14 @@ def _estimates(
     }  # fmt: skip
     cut = [f.saturated for f in found if f.saturated is not None]
     if len(cut) == len(found):
-        out["saturated"] = _scattered(f"saturated/{where}", "s", [cut[k::2] for k in (0, 1)]) + within(
-            f"ticks/cut/{where}", "sampling", tick / 2, "s"
-        )
+        out["saturated"] = _scattered(f"saturated/{where}", "s", _ways(found, cut)) + _alike(where, tick / len(cut))
     return out
+
+
+def _alike(where: str, u: float) -> Estimate:
+    """Zero, with what counts that are alike do not show: a step of them all may be a tick off."""
+    influence = Influence(f"ticks/cut/{where}", "ticks of a cut", u, "s", "B", "normal")
+    return Estimate.of(0.0, influence)
 
 
 def _loose(where: str, found: Sequence[Fine]) -> Estimate:
@@ -180,6 +184,6 @@ def _repeated(identity: str, unit: str, ways: Sequence[Sequence[float] | Array],
 
 
 def _read(identity: str, name: str, u: float, unit: str) -> Estimate:
-    """Zero, with a standard uncertainty of its own for either way of the mean."""
-    influence = Influence(id=identity, name=name, u=u / math.sqrt(2), unit=unit, kind="B", distribution="normal")
+    """Zero, with a standard uncertainty."""
+    influence = Influence(id=identity, name=name, u=u, unit=unit, kind="B", distribution="normal")
     return Estimate.of(0.0, influence)

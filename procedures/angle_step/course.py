@@ -3,11 +3,12 @@
 An encoder that changes its count makes the derivative kick: between two edges the angle is no parabola, and no polynomial that
 is drawn through edges knows of it. A rotor that turns freely follows its torque,
 
-    theta'' = gain i_theta - drag theta' + load,
+    theta'' = gain i_theta - drag theta' - friction sign(theta') + load,
 
-so that theta = a + b t + load t^2/2 + gain (integral of i_theta, twice) - drag (integral of theta), of which the edges give the
-five numbers; what they say besides (a detent, ripple, eddy currents) is smooth, and a spline that is as stiff as their ticks
-allow has it.
+so that theta = a + b t + load t^2/2 + gain (integral of i_theta, twice) - drag (integral of theta) - friction (integral of the
+sign, twice), of which the edges give the six numbers; what they say besides (a detent, ripple, eddy currents) is smooth, and a
+spline that is as stiff as their ticks allow has it. Friction is not smooth, it turns round where the angle does: without it the
+turning points of 2 degrees were read 0.005 of a count too low on every machine, both ways.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ import numpy.typing as npt
 from procedures.angle_step.edges import Edges
 
 Array = npt.NDArray[np.float64]
-LEAST = 12  # edges that five numbers are read from; a line from edge to edge does where there are fewer
+LEAST = 12  # edges that six numbers are read from; a line from edge to edge does where there are fewer
 AWAY = 1.5  # counts off where it ends: the angle still swings
 HALF_SWING = 5.0  # rise times; the last swing may leave its band after the last edge that is away
 BLUR = 0.003  # of a count: where an edge is, besides its tick
@@ -86,13 +87,15 @@ def course(found: Edges, t: Array, told: Array, torque: Array, begins: int, stif
         return Course(t, np.clip(straight, least, most), float("nan"))
     since = t - t[begins]
     shapes = np.array([np.ones_like(t), since, since**2 / 2, _summed(_summed(torque, t), t), _summed(straight, t)])
-    here = np.array([np.interp(at, t, shape) for shape in shapes]).T
-    blur = np.full(len(at), found.count)
+    blur, rubs = np.full(len(at), found.count), np.zeros_like(t)
     for _ in range(1 + PASSES):
+        known = np.array([*shapes, rubs])
+        here = np.array([np.interp(at, t, shape) for shape in known]).T
         numbers = np.linalg.lstsq(here / blur[:, None], y / blur, rcond=None)[0]
-        model = numbers @ shapes
-        speed = np.interp(at, t, np.gradient(model, t))
-        blur = np.hypot(speed * (t[1] - t[0]) / np.sqrt(12), BLUR * found.count)
+        model = numbers @ known
+        rate = np.gradient(model, t)
+        blur = np.hypot(np.interp(at, t, rate) * (t[1] - t[0]) / np.sqrt(12), BLUR * found.count)
+        rubs = _summed(_summed(np.sign(rate), t), t)
     within = (t >= at[0]) & (t <= at[-1])
     angle = np.where(within, model + _stiff(at, y - here @ numbers, blur, t, stiff), straight)
     return Course(t, np.clip(angle, least, most), float(numbers[3]))

@@ -11,7 +11,7 @@ import numpy as np
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
 from procedures.angle_step import captured, counted, steps
-from procedures.angle_step.budget import OUTBOARD, at_motor, gained, sampled, within
+from procedures.angle_step.budget import OUTBOARD, at_motor, gained, within
 from procedures.angle_step.response import Excursion, Response, response
 from procedures.angle_step.steps import Case, Done
 from procedures.servomotor.conventions import conventions
@@ -39,7 +39,7 @@ def by_case(moves: list[Done], rig: RigFile, band: float, count_rad: float, kp: 
     share = machine.sensor_share(rig.geometry["com_to_motor"].value, rig)
     gains = {axis: certified_gain(rig, channel) for axis, channel in machine.positions.items()}
     period = _period(moves)
-    tick = rig.devices["controller"].tick_s if machine.components == 2 else period
+    tick = rig.devices["controller"].tick_s
     bands = {case: max(band * case.size, 2 * count_rad) for case in steps.by_case(moves)}
     responses = {c: tuple(response(d.move, bands[c]) for d in done) for c, done in steps.by_case(moves).items()}
     finer, short = captured.by_case(moves, responses, rig, bands, count_rad, kp)
@@ -80,7 +80,7 @@ def _estimates(
         "peak_motor": mean("peak_motor", "m", lambda x: x.motor.peak) + _raised(f"motor/{where}", motor)
         + gained([(x.peak, x.towards) for x in motor], at_motor(share), gains),
         "excess": mean("excess", "m", lambda x: x.outboard.peak - x.outboard.away) + at_outboard - at_rest,
-        "saturated": _cut(where, mean("saturated", "s", lambda x: x.saturated), period, tick, len(r)),
+        "saturated": _cut(where, mean("saturated", "s", lambda x: x.saturated), period, tick),
     }  # fmt: skip
 
 
@@ -91,12 +91,9 @@ def _raised(identity: str, found: Sequence[Excursion]) -> Estimate:
     return noise - floor / 2 + within(f"noise/shape/{identity}", "shape of a peak between samples", otherwise, "m")
 
 
-def _cut(where: str, samples: Estimate, period: float, tick: float, steps: int) -> Estimate:
-    """How long an amplifier cut, s, of the samples that a cut fell in. Of a motor whose segments carry vectors a `tick` counts,
-    and such a sample holds one at least and ten at most: with a filter of 1 kHz the derivative cuts from count to count. Of
-    others the sample itself does."""
-    if tick == period:
-        return samples + sampled(f"sampling/each/{where}", period, steps)
+def _cut(where: str, samples: Estimate, period: float, tick: float) -> Estimate:
+    """How long an amplifier cut, s, of the samples that a cut fell in: each holds a `tick` of it at least, and all of its own
+    at most. With a filter of 1 kHz the derivative cuts from count to count."""
     least = tick / period
     open_to = within(f"sampling/cut/{where}", "how much of a sample was cut", (1 - least) / 2 * samples.value, "s")
     return samples * ((1 + least) / 2) + open_to + within(f"sampling/each/{where}", "sampling", tick / 2, "s")

@@ -31,7 +31,7 @@ def all_figures(moves: Sequence[Done], results: Mapping[Case, Result], rig: RigF
         *(figure for c in largest for figure in _currents(first[c], limit)),
         *_peaks(results),
     ]
-    if moves[0].swing is None or not moves[0].swing.asked:
+    if moves[0].swing is None or not (moves[0].swing.asked and moves[0].swing.whole):
         return drawn
     return sorted(drawn, key=lambda f: FIRST.index(f.key) if f.key in FIRST else len(FIRST))
 
@@ -79,7 +79,7 @@ def _radii(moves: Sequence[Done]) -> Figure:
 def _currents(done: Done, limit: float) -> Iterator[Figure]:
     """The segments' amplitudes; where a capture has them as vectors, the torque current within its bound and their sizes."""
     swing, name = done.swing, done.case.allocation
-    if swing is None or not swing.asked:
+    if swing is None or not (swing.asked and swing.whole):
         yield _segments(done, limit)
         return
     shown, most = swing.t <= SHOWN_S, 2 * swing.limit

@@ -30,7 +30,8 @@ class Servomotor:
     """Signals by axis: "x" or, upwards, "y" with the bearing, inboard "i" or outboard "o". `coils` has of each axis the one
     that pulls towards the positive end first. `segments` are the motor's currents: four amplitudes in the order of T (6.9), or
     q and d of each half, where it has two segments (T 7), and `components` how many each segment has; `direction` rad is where
-    its first one pushes. `asked`: what a capture calls the currents that the law asks for, "along", "across" and "torque".
+    its first one pushes. `asked`: what a capture calls the currents that the law asks for, "along", "across" and "torque", and
+    the "share" of the torque that the segments along have.
     `sensors` and `ambs` are the inboard and the outboard lever from the centre of mass, by their names in the rig file's
     geometry. Then the flags by what they mean."""
 

@@ -18,6 +18,7 @@ from procedures.angle_step.steps import Case, Done
 Array = npt.NDArray[np.float64]
 COUNT = 2 * math.pi / 4096
 SAMPLE = 1e-3
+RIGS = tuple(load_rig(name) for name in ("tsbs6", "tsbs12"))
 
 
 def means(bump_s: float, phase: float, n: int = 60) -> Array:
@@ -92,7 +93,7 @@ def test_a_rise_of_twenty_milliseconds_is_not_too_long(degrees: float, frequency
 @settings(max_examples=20, deadline=None)
 @given(cut=st.lists(st.integers(1, 10), min_size=0, max_size=12))
 def test_a_sample_that_a_cut_fell_in_holds_one_tick_of_it_or_ten(cut: list[int]) -> None:
-    """Of a motor with vectors; the derivative of counts cuts from tick to tick."""
+    """The derivative of counts cuts from tick to tick."""
     noise = np.random.default_rng(1).normal(0, 1e-8, (2, 1800))
     size = math.radians(10)
     move = stepping(size, 70, 0.4, 0.0, noise)
@@ -100,8 +101,9 @@ def test_a_sample_that_a_cut_fell_in_holds_one_tick_of_it_or_ten(cut: list[int])
     case = Case("static", size, 1000.0)
     back = Move(-size, move.t, -move.angle, *(getattr(move, f) for f in list(Move.__dataclass_fields__)[3:]))
     moves = [Done(case, m, 0, 0, (), 0, 0, target=m.step if m is move else 0.0) for m in (move, back) * 2]
-    for rig, true in (("tsbs6", sum(cut) * 1e-4), ("tsbs12", len(cut) * 1e-3)):
-        found = estimates.by_case(moves, load_rig(rig), 0.02, COUNT, 50.0)[case].estimates["saturated"]
+    true = sum(cut) * 1e-4
+    for rig in RIGS:
+        found = estimates.by_case(moves, rig, 0.02, COUNT, 50.0)[case].estimates["saturated"]
         assert found.value - 0.45e-3 * len(cut) - 1e-4 <= true <= found.value + 0.45e-3 * len(cut) + 1e-4
-        assert found.value == pytest.approx((0.55e-3 if rig == "tsbs6" else 1e-3) * len(cut))
-        assert found.u * math.sqrt(3) >= (0.45e-3 if rig == "tsbs6" else 0.0) * len(cut)
+        assert found.value == pytest.approx(0.55e-3 * len(cut))
+        assert found.u * math.sqrt(3) >= 0.45e-3 * len(cut)

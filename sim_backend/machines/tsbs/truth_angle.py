@@ -24,14 +24,13 @@ from sim_backend.motion import AngleAsked, AngleCase
 
 Array = npt.NDArray[np.float64]
 REPLICAS = 4  # of the run, each in noise of its own: a mean of steps that scatter is a truth only where they are many
-SEGMENT_SATURATED = 2
 ANSWERS = 0.5  # of its greatest: the torque current that answers a step
 SWINGS_S, TAIL_S = 0.3, 0.3  # of a record: where the shaft is looked at closely at least, and where it stands again
 CALM_S = 0.1  # within its band for so long, twice as long as a swing: then the angle has settled
 TURNED_S, HELD_S = 0.12, 7.0  # as long as the checks before the motor carries
 SEED = 20_000_001  # of noise that no run has; every rig has its own, for one that all share would be a bias of all
 SEGMENTS = [TRACE.index(f"i_m{k}") for k in range(1, 5)]
-LAW = {name: TRACE.index(name) for name in ("demand_x", "demand_y", "torque_given")}
+LAW = {name: TRACE.index(name) for name in ("demand_x", "demand_y", "torque_given", "lambda")}
 
 
 def seen_exactly(p: PlantParams) -> PlantParams:
@@ -84,12 +83,10 @@ def _peaks(paths: list[_Path]) -> Iterator[tuple[str, float]]:
 
 @dataclasses.dataclass(frozen=True)
 class _Seen:
-    """The true angle (n,) rad and displacement of two planes (2, 2, n) m of each tick, the flags of each sample of telemetry,
-    and the readings of each tick."""
+    """The true angle (n,) rad and displacement of two planes (2, 2, n) m of each tick, and the readings of each tick."""
 
     angle: Array
     planes: Array
-    flags: npt.NDArray[np.int64]
     trace: Array
 
 
@@ -138,18 +135,15 @@ class _Carried:
         self._write({self.asked.reference: target})
         after = self._swung(target, case.band)
         left = self.asked.record_s - len(after.trace) * TICK_S - TAIL_S
-        late = self.plant.run(round(left / TICK_S))
-        tail, later = self._standing(TAIL_S)
+        self.plant.run(round(left / TICK_S))
+        tail = self._standing(TAIL_S)
         torque = after.trace[:, SEGMENTS[:: 2 if self.p.phases == 6 else 1]].mean(axis=1)
         first = int(np.argmax(np.abs(torque) > ANSWERS * np.abs(torque).max()))
         values = list(_response(way * (after.angle - (target - way * case.size)), first, case))
         values.append(("final_error", tail - target))
+        values.append(("saturated", _cut(after.trace, self.p.segment_limit, self.p.phases)))
         if self.p.phases == 6:
-            values.append(("saturated", _cut(after.trace, self.p.segment_limit)))
             values.append(("amplitude", self._amplitude(after.trace)))
-        else:
-            flags = np.concatenate([after.flags, *(rows[:, -1].astype(np.int64) for rows in (late, later))])
-            values.append(("saturated", float((flags & SEGMENT_SATURATED != 0).sum()) * PERIOD_TICKS * TICK_S))
         if case.bounded:
             values.append(("bound_excess", _beyond(after.trace, self.asked.limit)))
         return _Path(way > 0, after.planes[..., first:], rest.planes.mean(axis=-1)), values
@@ -165,34 +159,31 @@ class _Carried:
         return _Seen(
             np.concatenate([x.angle for x in pieces]),
             np.concatenate([x.planes for x in pieces], axis=-1),
-            np.concatenate([x.flags for x in pieces]),
             np.concatenate([x.trace for x in pieces]),
         )
 
-    def _standing(self, seconds: float) -> tuple[float, Array]:
-        """The mean angle, rad, and the telemetry."""
-        angles, rows = [], []
+    def _standing(self, seconds: float) -> float:
+        """The mean angle, rad."""
+        angles = []
         for _ in range(round(seconds / 0.01)):
-            rows.append(self.plant.run(round(0.01 / TICK_S)))
+            self.plant.run(round(0.01 / TICK_S))
             angles.append(self.plant.state()["s"][5] + self.p.encoder_offset)
-        return float(np.mean(angles)), np.concatenate(rows)
+        return float(np.mean(angles))
 
     def _recorded(self, seconds: float) -> _Seen:
         """What the shaft does, from places and speeds every millisecond: it moves smoothly in between, but for what the
         derivative of the encoder's counts kicks it by, which a spline of its places alone would round off."""
         from scipy import interpolate
 
-        states, rows, trace = [self.plant.state()["s"]], [], []
+        states, trace = [self.plant.state()["s"]], []
         for _ in range(round(seconds / TICK_S / PERIOD_TICKS)):
-            row, ticks = self.plant.run(PERIOD_TICKS, 1)
+            _, ticks = self.plant.run(PERIOD_TICKS, 1)
             states.append(self.plant.state()["s"])
-            rows.append(row)
             trace.append(ticks)
         whole = np.arange(len(states)) * PERIOD_TICKS
         places, speeds = np.array(states)[:, :6], np.array(states)[:, 6:12] * TICK_S
         s = interpolate.CubicHermiteSpline(whole, places, speeds)(np.arange(whole[-1])).T
-        flags = np.concatenate(rows)[:, -1].astype(np.int64)
-        return _Seen(s[5] + self.p.encoder_offset, self._planes(s), flags, np.concatenate(trace))
+        return _Seen(s[5] + self.p.encoder_offset, self._planes(s), np.concatenate(trace))
 
     def _planes(self, s: Array) -> Array:
         """(2, 2, n) m off the sensors' zero: x and y at the outboard sensor and at the motor, of places (6, n)."""
@@ -231,10 +222,13 @@ def _crossing(y: Array, level: float) -> float:
     return k - 1 + float((level - y[k - 1]) / (y[k] - y[k - 1]))
 
 
-def _cut(trace: Array, limit: float) -> float:
-    """How long an amplifier of six phases has cut its current, s: amplitudes by T (7.12)."""
+def _cut(trace: Array, limit: float, phases: int) -> float:
+    """How long an amplifier has cut its current, s: by T (7.12) amplitudes of six phases, by T (6.19) of twelve. Samples of
+    telemetry that a cut fell in, which this was, go by where in a sample the step comes, and are up to two too many."""
     x, y, torque = (np.abs(trace[:, LAW[name]]) for name in ("demand_x", "demand_y", "torque_given"))
-    return float((np.hypot(torque + y, x) > limit * (1 + 1e-9)).sum()) * TICK_S
+    share = trace[:, LAW["lambda"]]
+    most = np.hypot(torque + y, x) if phases == 6 else np.maximum(2 * share * torque + y, 2 * (1 - share) * torque + x)
+    return float((most > limit * (1 + 1e-9)).sum()) * TICK_S
 
 
 def _beyond(trace: Array, limit: float) -> float:
