@@ -16,7 +16,7 @@ from bench.uncertainty import Estimate, Influence
 from procedures.axis_inertia import fit
 from procedures.axis_inertia.fit import Axis, Moved
 from procedures.axis_inertia.plan import Plan
-from procedures.axis_inertia.sequence import BARE, chosen, known, part, tones
+from procedures.axis_inertia.sequence import BARE, among_phases, chosen, known, part, tones
 from procedures.axis_inertia.steps import Sine
 from procedures.shared.certificates import certified
 from procedures.stages.map_bends import doubts
@@ -87,9 +87,8 @@ def results(sines: Sequence[Sine], rig: RigFile, plan: Plan) -> Result:
     out, apart = {}, {}
     for k, (name, axis) in enumerate(of.items()):
         value, unit = float(at[2 * k]), "kg m^2" if turns(axis) else "kg"
-        scatter = Influence(
-            f"scatter/{name}", "scatter of the repeats", float(u[2 * k]), unit, "A", "normal", plan.repeats - 1.0
-        )
+        own, dof = fit.scatter(each[:, 2 * k], np.array(among_phases(rig, axis, plan)))
+        scatter = Influence(f"scatter/{name}", "scatter of the repeats", own, unit, "A", "normal", dof)
         e = certificates[name] * (value / parts[name]) + Estimate.of(0.0, scatter)
         for influence, moves in bends.items():
             e = e + Estimate(0.0, "", {influence: float(moves[2 * k])})

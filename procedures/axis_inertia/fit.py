@@ -30,6 +30,8 @@ Take = npt.NDArray[np.intp]
 MOST, FEWEST = 40, 5  # harmonics
 ROUNDED = 1e-3  # of the square of the acceleration, that rounding of the reading may make
 SLOW = 0.3  # of the greatest speed: below it friction may be that of sticking
+LEFT = 4  # degrees of freedom, at least, where what goes around is taken out of a scatter
+EVEN = 1e-6
 DELAYS = (0.0, 2e-3)  # s, at which coefficients are worked out; between them they go straight
 
 
@@ -100,3 +102,14 @@ def pseudo(values: Sequence[Array], whole: Array) -> Array:
     """Of n results with one repeat left out each: what each repeat says by itself (Tukey), (n, q)."""
     n = len(values)
     return n * whole - (n - 1) * np.array(values)
+
+
+def scatter(values: Array, turn: Array) -> tuple[float, float]:
+    """Standard uncertainty of the mean of n values, and its degrees of freedom. Where they are spread evenly over the angles
+    `turn` (n,), rad, what goes once around with these adds nothing to the mean, and is left out of what scatters."""
+    n, around = len(values), np.exp(1j * turn)
+    even = abs(around.mean()) < EVEN and abs((around**2).mean()) < EVEN
+    parts = [np.ones(n), around.real, around.imag] if even and n - 3 >= LEFT else [np.ones(n)]
+    design, dof = np.column_stack(parts), n - len(parts)
+    left = values - design @ np.linalg.lstsq(design, values, rcond=None)[0]
+    return math.sqrt(float(left @ left) / dof / n), float(dof)

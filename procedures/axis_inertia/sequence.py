@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from bench.rigfile import RigFile
 from bench.rigfile.stage import StageAxis, axes_of
 from procedures.axis_inertia.plan import Part, Plan, Tones
-from procedures.stages.spread import turns
+from procedures.stages.spread import stands, turns
+from procedures.stages.stators import POLES
 
 PARTS: Mapping[str, tuple[str, str]] = {
     "ring": ("ring_mass", "ring_inertia"), "bar": ("added_mass", "added_mass_inertia"),
@@ -53,6 +55,16 @@ def part(axis: StageAxis, plan: Plan) -> Part:
 def known(axis: StageAxis, plan: Plan) -> str:
     """Of that part, the number of the machine that counts for the axis."""
     return PARTS[part(axis, plan)][turns(axis)]
+
+
+def among_phases(rig: RigFile, axis: StageAxis, plan: Plan) -> tuple[float, ...]:
+    """By repeat, where an axis around stands between two phases of its motor, as an angle of 2 pi from one to the next: the
+    rotor's poles by the phases of a stator are their number in a turn. 0 along, or where the rig file does not have them."""
+    poles = rig.machine.get(POLES)
+    if poles is None or not turns(axis):
+        return (0.0,) * plan.repeats
+    each = poles.value * max((len(m.currents) for m in rig.motors.values()), default=0)
+    return tuple(math.remainder(each * stands(axis, k, plan.repeats, 0.0), 2 * math.pi) for k in range(plan.repeats))
 
 
 def order(rig: RigFile, plan: Plan) -> Iterator[tuple[str, tuple[StageAxis, ...]]]:

@@ -7,7 +7,7 @@ import math
 from bench.rigfile import RigFile
 from bench.rigfile.stage import StageAxis, axes_of
 
-SPREAD = 1.25  # turns over all repeats: neither a turn nor a quarter of one comes again
+TWELFTHS = 15  # of a turn over all repeats, at least
 
 
 def turns(axis: StageAxis) -> bool:
@@ -25,8 +25,17 @@ def middle(axis: StageAxis) -> float:
     return (axis.low + axis.high) / 2 if math.isfinite(axis.high - axis.low) else 0.0
 
 
+def spread(repeats: int) -> float:
+    """Turns over so many repeats: twelfths that have no divisor in common with them, so that neither a turn nor a quarter nor a
+    twelfth of one comes again, and places lie evenly over each (a rotor of four poles in three phases is alike by these)."""
+    each = TWELFTHS
+    while math.gcd(each, repeats) > 1:
+        each += 1
+    return each / 12
+
+
 def stands(axis: StageAxis, repeat: int, repeats: int, half_m: float) -> float:
     """Where an axis stands in one of so many repeats: around, or up to `half_m` to each side of the middle."""
     if turns(axis):
-        return 2 * math.pi * SPREAD * repeat / repeats
+        return 2 * math.pi * spread(repeats) * repeat / repeats
     return middle(axis) + half_m * (2 * (repeat + 0.5) / repeats - 1)

@@ -19,16 +19,19 @@ from bench.errors import AnalysisError
 from bench.findings import Effect, Finding
 from bench.procedure import Measured
 from bench.rigfile import load_rig
+from bench.rigfile.stage import axes_of
 from bench.uncertainty import interval
 from procedures.axis_inertia import checks, estimates, fit
 from procedures.axis_inertia.plan import Plan
 from procedures.axis_inertia.procedure import check, procedure, untold
-from procedures.axis_inertia.sequence import chosen, known, order, part, step_count, tones
+from procedures.axis_inertia.sequence import among_phases, chosen, known, order, part, step_count, tones
 from procedures.axis_inertia.steps import Sine
 from procedures.stages.map_bends import doubts, moves
+from procedures.stages.spread import stands
 
 Array = npt.NDArray[np.float64]
 RIG = load_rig("rlsrm")
+AXES = axes_of(RIG)
 PLAN = Plan(repeats=4, delay_s=0.0)
 MOVED = {"x": 3.35, "angle": 1.5e-3}
 ADDED = {"x": 2.0, "angle": 1.2e-3}
@@ -129,6 +132,33 @@ def test_what_findings_need() -> None:
     assert loud(told(apart)) == {"sines-apart"}
     with pytest.raises(AnalysisError, match="1 sines are missing"):
         estimates.results(sound[1:], RIG, PLAN)
+
+
+def test_what_goes_around_among_the_phases_is_no_scatter() -> None:
+    """Eight places lie at eighths between two of twelve phases in a turn: 3 % that go around add nothing to the mean. Of noise
+    its standard uncertainty is told, by five degrees of freedom."""
+    at = np.array(among_phases(RIG, AXES["angle"], PLAN.model_copy(update={"repeats": 8})))
+    assert sorted(np.round(at / (np.pi / 4)) % 8) == pytest.approx(range(8))
+    noise = 1.5e-3 * 3e-3 * np.random.default_rng(5).normal(size=(4000, 8))
+    around = 1.5e-3 * (1 + 0.03 * np.cos(at + 0.4))
+    told = [fit.scatter(row, at) for row in noise + around]
+    assert {dof for _, dof in told} == {5.0}
+    assert np.mean([u**2 for u, _ in told]) == pytest.approx((1.5e-3 * 3e-3) ** 2 / 8, rel=0.05)
+    assert (noise + around).mean() == pytest.approx(1.5e-3, rel=1e-4)
+    plain = (float(noise[0].std(ddof=1)) / 8**0.5, 7.0)
+    assert fit.scatter(noise[0], np.zeros(8)) == pytest.approx(plain)
+    assert fit.scatter(noise[0][:5], np.zeros(5))[1] == 4
+    assert not any(among_phases(RIG, AXES["x"], PLAN))
+
+
+@pytest.mark.parametrize("repeats", range(4, 21))
+def test_no_place_around_comes_again(repeats: int) -> None:
+    """Nor does one a quarter of a turn on, or a twelfth; they lie evenly over each. Five of 15 twelfths stood alike."""
+    at = np.array([stands(AXES["angle"], k, repeats, 0.0) for k in range(repeats)])
+    for each in (1, 4, 12):
+        assert len(set(np.round(each * at * 12 * repeats / (2 * math.pi)) % (12 * repeats))) == repeats
+    assert np.sort(np.round(12 * at * repeats / (2 * math.pi)) % repeats) == pytest.approx(range(repeats))
+    assert stands(AXES["angle"], 1, 8, 0.0) == 2 * math.pi * 1.25 / 8
 
 
 def test_what_bends_the_map_by_hand() -> None:

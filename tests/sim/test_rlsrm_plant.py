@@ -196,6 +196,20 @@ def test_friction_can_differ_both_ways() -> None:
         assert drag == pytest.approx(way * share * 1.5, rel=1e-6)
 
 
+def test_friction_that_differs_goes_by_the_path_and_not_by_momentum() -> None:
+    """5 mm/s along and 5 mm/s of the surface around: 1.5 N (1 + 0.2/sqrt 2) on a path at 45 degrees, 1.2107 N and at 8 mm 9.686
+    mN m, however long the kick. A shaft at rest goes where it is pushed, at 1.5 N (1 + 0.2 cos) there."""
+    params, v = replace(PlantParams(), viscous=(0.0, 0.0), coulomb_sides=0.2), np.array([5e-3, 5 / 8])
+    for h in (1e-7, 1e-5):
+        drag = (v - rubbed(params, v, np.zeros(2), h)) / h * [3.35, 1.5e-3]
+        assert drag == pytest.approx([1.2107, 9.686e-3], rel=2e-3)
+    for turn in (0.3, 1.2, 2.5):
+        least = 1.5 * (1 + 0.2 * math.cos(turn))
+        push = np.array([math.cos(turn), 8e-3 * math.sin(turn)])
+        assert not rubbed(params, np.zeros(2), 0.999 * least * push, 2.5e-5).any()
+        assert rubbed(params, np.zeros(2), 1.001 * least * push, 2.5e-5).all()
+
+
 def test_bumpers_push_and_never_pull() -> None:
     """From 0.3 m/s it comes back slower and is free again; what it loses there is the damper's."""
     plant = Plant(replace(SMOOTH, viscous=(0.0, 0.0)))

@@ -28,12 +28,18 @@ double rlsrm_stop(const rlsrm_params *p, const rlsrm_state *st) {
     return away * most(p->stop_stiffness * into - away * p->stop_damping * st->v[X], 0);
 }
 
-/* along the path of the balls; `coulomb_sides`: how much more it is towards +x than on average, and less towards -x */
-static INLINE void rub_along_path(const rlsrm_params *p, const rlsrm_mover *m, double *v) {
+/* along the path of the balls; `coulomb_sides`: how much more it is towards +x than on average, and less towards -x. The path is
+ * that of the velocity `was` before the kick; what rests would go as it is pushed. (What is needed to stop it is no path: it
+ * points as momentum does, of which a shaft that turns has far more than one that slides as fast.) */
+static INLINE void rub_along_path(const rlsrm_params *p, const rlsrm_mover *m, const double *was, double *v) {
     double r = p->bearing_radius, wx = m->gain[X], wy = m->gain[ANGLE] * r * r, sx = v[X], sy = v[ANGLE] * r;
     double need_x = sx / wx, need_y = sy / wy, need = sqrt(need_x * need_x + need_y * need_y);
     if (need == 0) return;
-    double impulse = m->seconds * p->coulomb * (1 + p->coulomb_sides * need_x / need);
+    double impulse = m->seconds * p->coulomb;
+    if (p->coulomb_sides != 0) {
+        double went = hypot(was[X], was[ANGLE] * r);
+        impulse *= 1 + p->coulomb_sides * (went > 0 ? was[X] / went : need_x / need);
+    }
     if (need <= impulse) {
         v[X] = v[ANGLE] = 0;
         return;
@@ -52,11 +58,11 @@ static INLINE void rub_along_path(const rlsrm_params *p, const rlsrm_mover *m, d
 static INLINE double rubbed(double v, double change) { return v > change ? v - change : v < -change ? v + change : 0; }
 
 void rlsrm_kick(const rlsrm_params *p, const rlsrm_mover *m, rlsrm_state *st, const double *force) {
-    double *v = st->v;
+    double *v = st->v, was[2] = {v[X], v[ANGLE]};
     for (int k = 0; k < 2; k++)
         v[k] = p->locked[k] != 0 ? 0 : m->keep[k] * v[k] + m->gain[k] * m->seconds * force[k];
     if (p->along_path != 0) {
-        if (p->coulomb > 0) rub_along_path(p, m, v);
+        if (p->coulomb > 0) rub_along_path(p, m, was, v);
     } else {
         v[X] = rubbed(v[X], m->gain[X] * m->seconds * p->coulomb);
         v[ANGLE] = rubbed(v[ANGLE], m->gain[ANGLE] * m->seconds * p->coulomb_angle);
