@@ -7,10 +7,10 @@ from collections.abc import Iterable, Iterator
 from bench.procedure.requires import Requires
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
+from bench.rigfile.roles import STATE
 from procedures.actuator_constant import ring
 from procedures.actuator_constant.plan import Plan
 from procedures.actuator_constant.sines import loops, places, rate, sine, with_the_ring
-from procedures.actuator_constant.steps import STATE
 from procedures.position_loops.injection import BELOW, REFERENCE, ability, parameters_of
 from procedures.position_loops.motors import motors, periods_of
 from procedures.shared import planned

@@ -17,6 +17,7 @@ from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
+from bench.rigfile.roles import STATE
 from bench.rigfile.stage import axes_of
 from procedures.axis_breakaway import checks, estimates
 from procedures.axis_breakaway import figures as drawn
@@ -37,7 +38,7 @@ from procedures.axis_breakaway.sequence import (
     ramp,
 )
 from procedures.axis_breakaway.sequence import step_count as counted
-from procedures.axis_breakaway.steps import STATE, read_ramps
+from procedures.axis_breakaway.steps import read_ramps
 from procedures.shared.default_masses import nth_lightest
 from procedures.stages import assumptions
 

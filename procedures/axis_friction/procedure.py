@@ -17,6 +17,7 @@ from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
+from bench.rigfile.roles import STATE
 from bench.rigfile.stage import axes_of
 from procedures.axis_friction import checks, estimates
 from procedures.axis_friction import figures as drawn
@@ -38,7 +39,7 @@ from procedures.axis_friction.sequence import (
     written,
 )
 from procedures.axis_friction.sequence import step_count as counted
-from procedures.axis_friction.steps import STATE, read_passes
+from procedures.axis_friction.steps import read_passes
 from procedures.shared.default_masses import nth_lightest
 from procedures.stages import assumptions
 

@@ -16,6 +16,7 @@ from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
+from bench.rigfile.roles import STATE
 from bench.rigfile.stage import axes_of
 from procedures.axis_inertia import checks, estimates
 from procedures.axis_inertia import figures as drawn
@@ -24,7 +25,7 @@ from procedures.axis_inertia.moves import acquire
 from procedures.axis_inertia.plan import Plan
 from procedures.axis_inertia.sequence import chosen, known, plays, tones
 from procedures.axis_inertia.sequence import step_count as counted
-from procedures.axis_inertia.steps import STATE, read_sines
+from procedures.axis_inertia.steps import read_sines
 from procedures.stages import assumptions
 from procedures.stages.spread import middle, turns
 

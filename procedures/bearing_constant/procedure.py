@@ -20,12 +20,13 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
+from bench.rigfile.roles import STATE
 from procedures.bearing_constant import checks, estimates
 from procedures.bearing_constant import figures as drawn
 from procedures.bearing_constant.estimates import Result
 from procedures.bearing_constant.plan import Plan
 from procedures.bearing_constant.stand import captured, hooks, masses, planes, rate, set_points, settle_s, visits
-from procedures.bearing_constant.steps import STATE, VISIT, read_visits
+from procedures.bearing_constant.steps import VISIT, read_visits
 from procedures.shared import assumptions, planned
 from procedures.shared.rates import of_rate
 

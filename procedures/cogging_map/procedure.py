@@ -22,12 +22,13 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
+from bench.rigfile.roles import STATE
 from bench.uncertainty import Estimate
 from procedures.cogging_map import checks, estimates
 from procedures.cogging_map import figures as drawn
 from procedures.cogging_map.estimates import Result
 from procedures.cogging_map.plan import Plan
-from procedures.cogging_map.steps import STATE, SWEEP, read_passes
+from procedures.cogging_map.steps import SWEEP, read_passes
 from procedures.cogging_map.sweeps import Way, fed, loops, way
 from procedures.position_loops.injection import ability
 from procedures.position_loops.motors import around, motors, periods_of

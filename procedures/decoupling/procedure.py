@@ -22,12 +22,13 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
+from bench.rigfile.roles import STATE
 from bench.rigfile.stage import StageAxis, axes_of
 from procedures.decoupling import checks, estimates
 from procedures.decoupling import figures as drawn
 from procedures.decoupling.estimates import Result, coupling_of, excursion_of, named, ratio_of
 from procedures.decoupling.plan import Plan
-from procedures.decoupling.steps import ALONE, FAST, NUDGED, SLOW, SPARE_S, STATE, read_runs
+from procedures.decoupling.steps import ALONE, FAST, NUDGED, SLOW, SPARE_S, read_runs
 from procedures.shared import planned
 from procedures.stages import assumptions, map_model
 from procedures.stages.pairs import lacks, pairs, played, silenced, sine, waits_at

@@ -20,12 +20,13 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
+from bench.rigfile.roles import STATE
 from procedures.emf_constant import checks, estimates
 from procedures.emf_constant import figures as drawn
 from procedures.emf_constant.estimates import Result
 from procedures.emf_constant.moves import Line, captured, lines, rate, seconds, windings
 from procedures.emf_constant.plan import Plan
-from procedures.emf_constant.steps import MOVE, STATE, read_taken
+from procedures.emf_constant.steps import MOVE, read_taken
 from procedures.position_loops.motors import periods_of
 from procedures.shared import assumptions, planned
 from procedures.shared.rates import of_rate

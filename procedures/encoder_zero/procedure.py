@@ -23,12 +23,13 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
+from bench.rigfile.roles import STATE
 from procedures.encoder_zero import checks, estimates, groups
 from procedures.encoder_zero import figures as drawn
 from procedures.encoder_zero.estimates import Result
 from procedures.encoder_zero.groups import ALONG, PLACES, TRIAL_REPEATS, Group, Setting, parameter_of, settings_of
 from procedures.encoder_zero.plan import Plan
-from procedures.encoder_zero.steps import STATE, STEP, Taken, read_taken
+from procedures.encoder_zero.steps import STEP, Taken, read_taken
 from procedures.position_loops.motors import periods_of
 from procedures.shared import assumptions, planned
 from procedures.shared.rates import of_rate

@@ -19,6 +19,7 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
+from bench.rigfile.roles import STATE
 from procedures.gate_margin import checks, estimates
 from procedures.gate_margin import figures as drawn
 from procedures.gate_margin.estimates import Results, weight_of
@@ -37,7 +38,7 @@ from procedures.gate_margin.place import (
     rate,
 )
 from procedures.gate_margin.plan import Plan
-from procedures.gate_margin.steps import STATE, read_taken, read_trials
+from procedures.gate_margin.steps import read_taken, read_trials
 from procedures.shared import assumptions, planned
 
 MARGIN = Quantity("gate_margin", "m", "gate less the largest radial reading in one of its times, noise included, "

@@ -23,12 +23,13 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.capture import rises
 from bench.rigfile.envelope import Envelope
+from bench.rigfile.roles import STATE
 from procedures.inductance_map import checks, estimates
 from procedures.inductance_map import figures as drawn
 from procedures.inductance_map.estimates import Result
 from procedures.inductance_map.places import Place, grid
 from procedures.inductance_map.plan import Plan
-from procedures.inductance_map.steps import PLACE, STATE, captured, read_taken
+from procedures.inductance_map.steps import PLACE, captured, read_taken
 from procedures.shared.rates import of_rate
 from procedures.stages import assumptions
 from procedures.stages.stators import POLES, Phase, axis, lacks, phases

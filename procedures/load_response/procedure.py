@@ -22,6 +22,7 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
+from bench.rigfile.roles import STATE
 from procedures.load_response import checks, estimates
 from procedures.load_response import figures as drawn
 from procedures.load_response.estimates import BAND, COMPLIANCE, FRICTION, LEFT, PEAK, SCALE, Result
@@ -29,7 +30,7 @@ from procedures.load_response.moves import approaches, disturbances, integrators
 from procedures.load_response.plan import Plan
 from procedures.load_response.sequence import INTEGRATORS, chosen, lead, masses
 from procedures.load_response.sequence import step_count as counted
-from procedures.load_response.steps import STATE, Change, read_changes, read_rests
+from procedures.load_response.steps import Change, read_changes, read_rests
 from procedures.shared.default_masses import by_weight
 from procedures.stages import assumptions
 from procedures.stages.known_loads import loaded, sources

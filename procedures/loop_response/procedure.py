@@ -21,6 +21,7 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
+from bench.rigfile.roles import STATE
 from procedures.loop_response import checks, estimates, grid
 from procedures.loop_response import figures as drawn
 from procedures.loop_response.estimates import Result
@@ -39,7 +40,7 @@ from procedures.loop_response.injection import (
     sine,
 )
 from procedures.loop_response.plan import Plan
-from procedures.loop_response.steps import REFINED, STATE, STEP, SURVEY, line_of, read_taken
+from procedures.loop_response.steps import REFINED, STEP, SURVEY, line_of, read_taken
 from procedures.shared import assumptions, planned
 from procedures.shared.rates import of_rate
 

@@ -19,12 +19,13 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
+from bench.rigfile.roles import STATE
 from procedures.map_zero import checks, estimates
 from procedures.map_zero import figures as drawn
 from procedures.map_zero.approaches import Approach, approaches, ramp
 from procedures.map_zero.estimates import Stator
 from procedures.map_zero.plan import Plan
-from procedures.map_zero.steps import LEVEL, STATE, read_rests
+from procedures.map_zero.steps import LEVEL, read_rests
 from procedures.stages import assumptions
 from procedures.stages.stators import POLES, axis, lacks, phases
 

@@ -12,12 +12,12 @@ from bench.errors import Lacking
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.rigfile.capabilities_of_loops import Motion
+from bench.rigfile.roles import STATE
 from procedures.mission.plan import Plan
 
 Array = npt.NDArray[np.float64]
 TURN, LIFT, MOVE = "turn", "lift", "move"
 PLACES = 2
-STATE = "state"
 
 
 def motion(rig: RigFile) -> Motion:

@@ -22,13 +22,14 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
+from bench.rigfile.roles import STATE
 from bench.rigfile.stage import axes_of
 from procedures.positioning import checks, estimates
 from procedures.positioning import figures as drawn
 from procedures.positioning.estimates import Result
 from procedures.positioning.plan import Plan
 from procedures.positioning.standard import FIGURES
-from procedures.positioning.steps import READ, READING, REST, STATE, read_taken
+from procedures.positioning.steps import READ, READING, REST, read_taken
 from procedures.positioning.targets import UP, Approach, cycle, fewest
 from procedures.positioning.way import Tested, rates, readable, tested
 from procedures.stages import assumptions

@@ -22,6 +22,7 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
+from bench.rigfile.roles import STATE
 from procedures.pull_ratio import checks, estimates
 from procedures.pull_ratio import figures as drawn
 from procedures.pull_ratio.estimates import Result
@@ -42,7 +43,7 @@ from procedures.pull_ratio.planes import (
     rate,
     settle_s,
 )
-from procedures.pull_ratio.steps import STATE, STEP, Taken, read_taken
+from procedures.pull_ratio.steps import STEP, Taken, read_taken
 from procedures.shared import assumptions, planned
 from procedures.shared.rates import of_rate
 

@@ -21,12 +21,13 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
+from bench.rigfile.roles import STATE
 from procedures.runout_map import checks, estimates
 from procedures.runout_map import figures as drawn
 from procedures.runout_map.estimates import Results
 from procedures.runout_map.plan import Plan
 from procedures.runout_map.planes import planes
-from procedures.runout_map.steps import STATE, TURN, read_turns
+from procedures.runout_map.steps import TURN, read_turns
 from procedures.shared import assumptions, planned
 
 RUNOUT = Quantity("runout", "m", "runout of the probes' target less that of the magnets, of one plane and part")

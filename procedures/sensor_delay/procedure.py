@@ -19,13 +19,14 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
+from bench.rigfile.roles import STATE
 from procedures.position_loops.injection import BELOW, FORCE, Sine, ability, injected, parameters_of
 from procedures.sensor_delay import checks, estimates
 from procedures.sensor_delay import figures as drawn
 from procedures.sensor_delay.estimates import Result
 from procedures.sensor_delay.plan import Plan
 from procedures.sensor_delay.sines import captured, probes, rate, sines
-from procedures.sensor_delay.steps import SINE, STATE, read_taken
+from procedures.sensor_delay.steps import SINE, read_taken
 from procedures.shared import assumptions, planned
 from procedures.shared.rates import of_rate
 

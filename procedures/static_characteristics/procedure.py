@@ -24,6 +24,7 @@ from bench.recording.earlier import AGAIN
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
+from bench.rigfile.roles import STATE
 from procedures.shared import continued
 from procedures.stages import assumptions
 from procedures.stages.stators import POLES, axis, lacks, phases
@@ -33,7 +34,7 @@ from procedures.static_characteristics.beside import Beside, by_flux, of_control
 from procedures.static_characteristics.estimates import Result
 from procedures.static_characteristics.places import SIDES, Load, grid, loads, repeated
 from procedures.static_characteristics.plan import Plan
-from procedures.static_characteristics.steps import READ, READING, STATE, Cell, cells, read_taken
+from procedures.static_characteristics.steps import READ, READING, Cell, cells, read_taken
 
 PART = "cells"
 MAP = "inductance-map"

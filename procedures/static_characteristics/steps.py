@@ -11,6 +11,7 @@ import numpy.typing as npt
 from bench.recording import Recording, Step
 from bench.rigfile import RigFile
 from bench.rigfile.capabilities_of_cells import LoadCell
+from bench.rigfile.roles import STATE
 from bench.rigfile.stage import StageAxis
 from procedures.inductance_map.places import Place
 from procedures.stages.stators import Phase, axis, phases
@@ -19,7 +20,6 @@ from procedures.static_characteristics.plan import Plan
 
 Array = npt.NDArray[np.float64]
 READING, READ = "reading", "cell-read"
-STATE = "state"
 
 
 @dataclass(frozen=True)

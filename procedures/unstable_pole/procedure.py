@@ -21,13 +21,14 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.capture import rises
 from bench.rigfile.envelope import Envelope
+from bench.rigfile.roles import STATE
 from procedures.shared import assumptions, planned
 from procedures.unstable_pole import checks, estimates
 from procedures.unstable_pole import figures as drawn
 from procedures.unstable_pole.estimates import Result
 from procedures.unstable_pole.hold import SPARE, ability, captured, chosen, foreseen, place, rate
 from procedures.unstable_pole.plan import Plan
-from procedures.unstable_pole.steps import STATE, STEP, read_taken
+from procedures.unstable_pole.steps import STEP, read_taken
 
 POLE = Quantity("pole", "1/s", "how fast both planes leave their place together, held currents: sqrt((K_1 + K_2)/m)",
                 title="unstable pole")  # fmt: skip
