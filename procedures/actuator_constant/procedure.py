@@ -24,9 +24,10 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from procedures.actuator_constant import checks, estimates, ring
 from procedures.actuator_constant import figures as drawn
-from procedures.actuator_constant.asked import adds, check, requires
+from procedures.actuator_constant.asked import adds, check
 from procedures.actuator_constant.estimates import Result
 from procedures.actuator_constant.plan import Plan
+from procedures.actuator_constant.requires import requires
 from procedures.actuator_constant.sines import (
     Place,
     frequencies,

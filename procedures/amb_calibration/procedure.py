@@ -16,13 +16,11 @@ import numpy as np
 from bench.figures import Figure
 from bench.findings import Ended, Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from bench.rigfile.roles import STATUS
 from bench.uncertainty import Estimate, interval, propagate
 from procedures.amb_calibration import both_coils, checks, halves, hypotheses, turns
 from procedures.amb_calibration import by_angle as amb_calibration_by_angle
@@ -35,8 +33,9 @@ from procedures.amb_calibration.hypotheses import Contradiction
 from procedures.amb_calibration.inputs import fit_inputs, hand_rad
 from procedures.amb_calibration.plan import FEWEST_MASSES, Plan
 from procedures.amb_calibration.pulls import Loaded, Pull, pulls
+from procedures.amb_calibration.requires import requires
 from procedures.amb_calibration.scatter import Scatter, covariance_by_angle, covariance_over_a_turn, outputs, scatter
-from procedures.amb_calibration.steps import Hang, HangingData, channels, hung, read_hangings
+from procedures.amb_calibration.steps import Hang, HangingData, hung, read_hangings
 from procedures.servomotor.loads import check_masses
 from procedures.shared import assumptions, continued
 from procedures.shared.default_masses import by_weight
@@ -219,21 +218,6 @@ def figures(parts: list[Analysis], recording: Recording[Plan]) -> Iterable[Figur
         values = {name: e.value for name, e in a.inputs.items()}
         for figure in drawn.all_figures(recording, a.data, a.fit, values):
             yield figure if len(parts) == 1 else replace(figure, key=f"{figure.key}-{a.fit.pull.hook}")
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the rig file's tables."""
-    found = pulls(rig)
-    return Requires(
-        lacks=tuple(turns.lacks(rig)),
-        roles=("levitation", "operator"),
-        channels=(*channels(rig), STATUS),
-        sensors=tuple(dict.fromkeys(coil for pull in found for axis in pull.axes for coil in axis.coils)),
-        parameters=turns.parameters(rig),
-        capabilities=("bias",),
-        masses=True,
-        uses=("angle",),
-    )
 
 
 procedure = Procedure(

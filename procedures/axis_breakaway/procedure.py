@@ -12,21 +12,19 @@ from bench.errors import AnalysisError
 from bench.figures import Figure
 from bench.findings import Effect, Finding, Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
-from bench.rigfile.roles import STATE
 from bench.rigfile.stage import axes_of
 from procedures.axis_breakaway import checks, estimates
 from procedures.axis_breakaway import figures as drawn
 from procedures.axis_breakaway.estimates import Result
 from procedures.axis_breakaway.moves import acquire
 from procedures.axis_breakaway.plan import Plan
+from procedures.axis_breakaway.requires import requires
 from procedures.axis_breakaway.sequence import (
     BACK,
-    INTEGRATORS,
     PULLS,
     RADIUS,
     chosen,
@@ -102,21 +100,6 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
             yield from (f"helix {share:g}: {problem}" for problem in envelope.problems_of(wanted))
     if any(share <= 0 for share in plan.helix) or len(set(plan.helix)) < len(plan.helix):
         yield f"helix: found {', '.join(f'{s:g}' for s in plan.helix)}; expected shares above 0, each once"
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig has."""
-    axes = axes_of(rig).values()
-    lacks = [f"capabilities.positioning.axes.{a.name}: found no {part}" for a in axes for part in ("asked", "rate")
-             if not getattr(a, part)]  # fmt: skip
-    lacks += [f"hooks, levers: found none that pull {a.name} both ways" for a in axes if not loads(rig, a)]
-    return Requires(
-        roles=("motion", "operator"),
-        channels=(*(a.channel for a in axes), STATE) if axes else (),
-        capabilities=("positioning", f"settings.{INTEGRATORS}"),
-        masses=True,
-        lacks=tuple(lacks),
-    )
 
 
 def untold(rig: RigFile) -> tuple[Quantity, ...]:

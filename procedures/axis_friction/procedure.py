@@ -12,18 +12,17 @@ from bench.errors import AnalysisError
 from bench.figures import Figure
 from bench.findings import Effect, Finding, Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
-from bench.rigfile.roles import STATE
 from bench.rigfile.stage import axes_of
 from procedures.axis_friction import checks, estimates
 from procedures.axis_friction import figures as drawn
 from procedures.axis_friction.estimates import Result
 from procedures.axis_friction.moves import acquire
 from procedures.axis_friction.plan import Plan
+from procedures.axis_friction.requires import requires
 from procedures.axis_friction.sequence import (
     chosen,
     crossed,
@@ -107,19 +106,6 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
             yield from (f"helix: {problem}" for problem in envelope.problems_of({pair[0].target: end}))
         far = max(helix_turns(pair, plan, rate) for rate in plan.helix_rad_s) + start(pair[1], plan, plan.repeats)
         yield from (f"helix: {problem}" for problem in envelope.problems_of({pair[1].target: far}))
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig has."""
-    axes = axes_of(rig).values()
-    lacks = [f"capabilities.positioning.axes.{a.name}: found no {part}" for a in axes for part in ("asked", "rate")
-             if not getattr(a, part)]  # fmt: skip
-    return Requires(
-        roles=("motion",),
-        channels=(*(a.channel for a in axes), STATE) if axes else (),
-        capabilities=("positioning",),
-        lacks=tuple(lacks),
-    )
 
 
 def untold(rig: RigFile) -> tuple[Quantity, ...]:

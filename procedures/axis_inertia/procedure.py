@@ -11,18 +11,17 @@ from bench.errors import AnalysisError
 from bench.figures import Figure
 from bench.findings import Effect, Finding, Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
-from bench.rigfile.roles import STATE
 from bench.rigfile.stage import axes_of
 from procedures.axis_inertia import checks, estimates
 from procedures.axis_inertia import figures as drawn
 from procedures.axis_inertia.estimates import Result
 from procedures.axis_inertia.moves import acquire
 from procedures.axis_inertia.plan import Plan
+from procedures.axis_inertia.requires import requires
 from procedures.axis_inertia.sequence import chosen, known, plays, tones
 from procedures.axis_inertia.sequence import step_count as counted
 from procedures.axis_inertia.steps import read_sines
@@ -80,20 +79,6 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
             if not turns(axis):
                 wanted[axis.target] = middle(axis) + tone.amplitude
             yield from (f"{axis.name} at {tone.hz:g} Hz: {problem}" for problem in envelope.problems_of(wanted))
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig has."""
-    able = [a for a in axes_of(rig).values() if plays(a)]
-    if axes_of(rig) and not able:
-        return Requires(roles=("motion",), capabilities=("positioning",),
-                        lacks=("capabilities.positioning.axes: found no wave with a sine",))  # fmt: skip
-    return Requires(
-        roles=("motion",),
-        channels=(*(a.channel for a in able), STATE) if able else (),
-        machine=tuple(dict.fromkeys(known(a, Plan.model_validate({})) for a in able)),
-        capabilities=("positioning",),
-    )
 
 
 def untold(rig: RigFile) -> tuple[Quantity, ...]:

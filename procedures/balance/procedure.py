@@ -25,6 +25,7 @@ from procedures.balance.estimates import Result
 from procedures.balance.hum import of_balance
 from procedures.balance.plan import Plan
 from procedures.balance.planes import names_of
+from procedures.balance.requires import requires
 from procedures.balance.steps import BASE, known_by, read_runs
 from procedures.shared import assumptions, first_look
 from procedures.synchronous import bearings, dwelling
@@ -175,7 +176,7 @@ procedure = Procedure(
     evaluate=evaluate,
     measured=measured,
     figures=figures,
-    requires=checks.requires,
+    requires=requires,
     check=check,
     settings=settings,
     step_count=step_count,

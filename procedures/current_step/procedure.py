@@ -14,7 +14,6 @@ from bench.errors import Lacking
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
@@ -25,6 +24,7 @@ from procedures.current_step import checks, estimates, fit
 from procedures.current_step import figures as drawn
 from procedures.current_step.estimates import Place
 from procedures.current_step.plan import Plan
+from procedures.current_step.requires import requires
 from procedures.current_step.steps import (
     LARGE,
     PUSH,
@@ -168,16 +168,6 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
         if (needed := size * seconds(plan, LARGE) / tick_s) > rig.capture.memory_bytes:
             yield (f"hold_s: a capture of {seconds(plan, LARGE):.3g} s takes {needed:.0f} bytes; the controller's memory holds "
                    f"{rig.capture.memory_bytes}")  # fmt: skip
-
-
-def requires(rig: RigFile) -> Requires:
-    """Currents that are stepped, and what captures read of each."""
-    steps = rig.capabilities.current_steps.values()
-    return Requires(
-        capabilities=("current_steps",),
-        parameters=tuple(step.parameter for step in steps),
-        capture=tuple(dict.fromkeys(name for step in steps for name in (step.along, step.across))),
-    )
 
 
 procedure = Procedure(

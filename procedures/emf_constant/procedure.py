@@ -13,21 +13,19 @@ from bench.calibration import Need
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
-from bench.rigfile.roles import STATE
 from procedures.emf_constant import checks, estimates
 from procedures.emf_constant import figures as drawn
 from procedures.emf_constant.estimates import Result
 from procedures.emf_constant.moves import Line, captured, lines, rate, seconds, windings
 from procedures.emf_constant.plan import Plan
+from procedures.emf_constant.requires import requires
 from procedures.emf_constant.steps import MOVE, read_taken
-from procedures.position_loops.motors import periods_of
 from procedures.shared import assumptions, planned
 from procedures.shared.rates import of_rate
 
@@ -129,26 +127,6 @@ def figures(results: Sequence[Result], recording: Recording[Plan]) -> Iterable[F
     """What is left of the voltage beside the speed's flux, of each motor."""
     del recording
     return drawn.all_figures(results)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig has."""
-    wanted, of, can = ("force_currents", "coil_map", "current_steps", "motion"), windings(rig), rig.capabilities
-    if can.motion is None or can.coil_map is None or not can.force_currents or not can.current_steps:
-        return Requires(capabilities=wanted, capture=())
-    if not of:
-        return Requires(
-            capabilities=wanted, capture=(), lacks=("capabilities.current_steps: found voltages of no motor's coils",)
-        )
-    channels = tuple(n for w in of.values() for n in (w.channel, *w.coils, *w.voltages.values()))
-    return Requires(
-        channels=(STATE,),
-        sensors=tuple(n for w in of.values() for n in (*w.coils, *w.voltages.values())),
-        machine=periods_of(rig, "machine", of),
-        geometry=periods_of(rig, "geometry", of),
-        capabilities=wanted,
-        capture=tuple(dict.fromkeys(channels)),
-    )
 
 
 def untold(rig: RigFile) -> tuple[Quantity, ...]:

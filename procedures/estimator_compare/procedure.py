@@ -14,18 +14,17 @@ from bench.errors import Lacking
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import NOTHING, Load, RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from bench.rigfile.roles import STATUS
 from procedures.estimator_compare import checks, estimates
 from procedures.estimator_compare import figures as drawn
 from procedures.estimator_compare.estimates import Result
 from procedures.estimator_compare.observers import predicted_ratio
 from procedures.estimator_compare.plan import Plan
+from procedures.estimator_compare.requires import requires
 from procedures.estimator_compare.steps import ENGAGE, HANG, captured, read_taken
 from procedures.one_axis.bank import RULES, Array, bank
 from procedures.one_axis.conventions import OneAxis, conventions
@@ -161,25 +160,6 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
             yield f"{key}: found {', '.join(chosen)}; expected each once"
     if plan.load not in rig.masses:
         yield f"load: found {plan.load!r}; expected one of the rig's masses: {', '.join(rig.masses)}"
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig's machine has."""
-    machine = conventions(rig)
-    return Requires(
-        roles=("levitation", "operator"),
-        channels=(machine.position, STATUS),
-        capabilities=(
-            "settings.estimator",
-            "settings.compensation",
-            "model.harmonic_hz",
-            "model.degree",
-            "model.window",
-            "model.rule",
-        ),
-        capture=captured(machine, ENGAGE),
-        masses=True,
-    )
 
 
 procedure = Procedure(

@@ -30,8 +30,9 @@ from procedures.force_constant import figures as drawn
 from procedures.force_constant.estimates import AxisResult
 from procedures.force_constant.first_angle import CALIBRATION
 from procedures.force_constant.fit import TIME
-from procedures.force_constant.fitting import check, requires
+from procedures.force_constant.fitting import check
 from procedures.force_constant.plan import Plan
+from procedures.force_constant.requires import requires
 from procedures.force_constant.steps import AtLevel, RampData, channels, read_ramps
 from procedures.servomotor.conventions import conventions
 from procedures.servomotor.facts import of_ends

@@ -12,14 +12,12 @@ from bench.calibration import Need
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
-from bench.rigfile.roles import STATE
 from procedures.gate_margin import checks, estimates
 from procedures.gate_margin import figures as drawn
 from procedures.gate_margin.estimates import Results, weight_of
@@ -34,10 +32,10 @@ from procedures.gate_margin.place import (
     grid,
     motion,
     planes,
-    radial,
     rate,
 )
 from procedures.gate_margin.plan import Plan
+from procedures.gate_margin.requires import requires
 from procedures.gate_margin.steps import read_taken, read_trials
 from procedures.shared import assumptions, planned
 
@@ -218,20 +216,6 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 def figures(found: Results, recording: Recording[Plan]) -> Iterable[Figure]:
     """Largest readings with the gate, their distribution, the catch."""
     return drawn.all_figures(found, recording.rig)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig has."""
-    if rig.capabilities.motion is None:
-        return Requires(capabilities=("motion",), capture=())
-    at, probes = motion(rig), radial(rig)
-    return Requires(
-        channels=(*probes.values(), at.place_channel, STATE),
-        capabilities=("motion", "motion.gate", "motion.gate_time"),
-        capture=captured(rig),
-        uses=("settings.observer", "hold", "loop_injection"),
-        lacks=() if probes else ("probes: found none across the shaft; expected the radial ones",),
-    )
 
 
 def untold(rig: RigFile) -> tuple[Quantity, ...]:

@@ -14,14 +14,12 @@ from bench.errors import AnalysisError
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
-from bench.rigfile.roles import STATE
 from procedures.loop_response import checks, estimates, grid
 from procedures.loop_response import figures as drawn
 from procedures.loop_response.estimates import Result
@@ -40,6 +38,7 @@ from procedures.loop_response.injection import (
     sine,
 )
 from procedures.loop_response.plan import Plan
+from procedures.loop_response.requires import requires
 from procedures.loop_response.steps import REFINED, STEP, SURVEY, line_of, read_taken
 from procedures.shared import assumptions, planned
 from procedures.shared.rates import of_rate
@@ -202,20 +201,6 @@ def figures(results: Sequence[Result], recording: Recording[Plan]) -> Iterable[F
     """|y/r| of all loops with their -3 dB, and |S| over its zones."""
     del recording
     return drawn.all_figures(results)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig has."""
-    can = rig.capabilities.loop_injection
-    if can is None:
-        return Requires(capabilities=("loop_injection",), capture=())
-    shown = tuple(dict.fromkeys(loop.channel for loop in can.loops.values()))
-    return Requires(
-        channels=(*shown, STATE),
-        capabilities=("loop_injection",),
-        capture=(*shown, *([can.wave] if can.wave else [])),
-        lacks=() if REFERENCE in can.places else ("capabilities.loop_injection.places: found no reference",),
-    )
 
 
 def untold(rig: RigFile) -> tuple[Quantity, ...]:

@@ -11,7 +11,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.procedure.states import transition
@@ -19,15 +18,15 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
-from bench.rigfile.roles import STATE
 from procedures.map_zero import checks, estimates
 from procedures.map_zero import figures as drawn
 from procedures.map_zero.approaches import Approach, approaches, ramp
 from procedures.map_zero.estimates import Stator
 from procedures.map_zero.plan import Plan
+from procedures.map_zero.requires import requires
 from procedures.map_zero.steps import LEVEL, read_rests
 from procedures.stages import assumptions
-from procedures.stages.stators import POLES, axis, lacks, phases
+from procedures.stages.stators import axis
 
 ZERO = Quantity(
     "zero", "rad", "what the encoder reads where the first phase of a stator is aligned, mean over the turn"
@@ -119,21 +118,6 @@ def figures(found: Sequence[Stator], recording: Recording[Plan]) -> Iterable[Fig
     """Alignments and levels."""
     del recording
     return drawn.all_figures(found)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig has."""
-    wanted, test = ("positioning", "phase_test"), rig.capabilities.phase_test
-    if test is None or rig.capabilities.positioning is None:
-        return Requires(roles=("motion",), capabilities=wanted)
-    return Requires(
-        roles=("motion", "operator"),
-        channels=(STATE, *(a.channel for a in (axis(rig, "stroke"), axis(rig, "angle")) if a is not None),
-                  *(p.current for p in phases(rig))),
-        machine=(POLES,),
-        capabilities=wanted,
-        lacks=(*lacks(rig), *(() if test.current else ("capabilities.phase_test: found no current",))),
-    )  # fmt: skip
 
 
 def holds_for(_: Plan) -> Mapping[str, float]:

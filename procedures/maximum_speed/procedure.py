@@ -13,7 +13,6 @@ from bench.calibration import Calibration, Need
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
@@ -23,12 +22,13 @@ from procedures.maximum_speed import checks, estimates, foresight
 from procedures.maximum_speed import figures as drawn
 from procedures.maximum_speed.estimates import Result
 from procedures.maximum_speed.plan import OP, SHARINGS, Plan
+from procedures.maximum_speed.requires import requires
 from procedures.maximum_speed.running import carry_so_much, guard_of, limit_of, run_all
-from procedures.maximum_speed.steps import captured, channels, coils, read_windows
+from procedures.maximum_speed.steps import read_windows
 from procedures.servomotor import carrying, hold, segments, wiring
 from procedures.servomotor.conventions import conventions
 from procedures.servomotor.direction import of_probe
-from procedures.servomotor.parameters import BIASES, chosen, named, needed, stated, write
+from procedures.servomotor.parameters import BIASES, chosen, named, stated, write
 from procedures.shared import assumptions
 
 SPEED_HALF = Quantity(
@@ -65,7 +65,6 @@ SD = Quantity(
 )
 SINGLES = (SPEED_HALF, SPEED_OP, RATIO, RATIO_PREDICTED, PREDICTED_HALF, PREDICTED_OP, SLOPE)
 MEASURES = (*SINGLES, SD)
-NEEDED = ("motor.share", "motor.share_slew", "motor.segment_limit", "motor.ramp", "motor.ref_along", "angle.speed")
 WORDS = {"half": "λ = 1/2", "op": "λ by (6.24)"}
 
 
@@ -158,22 +157,6 @@ def foresees(rig: RigFile, plan: Plan, facts: Mapping[str, Calibration]) -> Iter
 def figures(result: Result, recording: Recording[Plan]) -> Iterable[Figure]:
     """Speed over time, torque over speed, currents and bound within a turn."""
     return drawn.all_figures(result, recording, limit_of(recording.rig, recording.plan))
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig's machine has."""
-    machine = conventions(rig)
-    return Requires(
-        lacks=machine.lacks,
-        roles=("levitation", "rotation"),
-        channels=(*channels(machine), *wiring.channels(machine)),
-        sensors=(*machine.segments, *coils(machine)),
-        parameters=needed(rig, *hold.NEEDED, *wiring.NEEDED, *BIASES, *NEEDED),
-        capabilities=("settings.sharing", "settings.torque", "settings.commutation"),
-        capture=captured(machine),
-        machine=("pole_pairs", "segment_gain", "torque_ripple"),
-        geometry=("motor_stiffness", "com_to_inboard_amb", "com_to_motor", "com_to_outboard_sensor"),
-    )
 
 
 procedure = Procedure(

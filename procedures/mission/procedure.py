@@ -16,7 +16,6 @@ from bench.errors import DeviceFault, InterlockError
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
@@ -26,6 +25,7 @@ from procedures.mission import checks, estimates
 from procedures.mission import figures as drawn
 from procedures.mission.estimates import Told
 from procedures.mission.plan import Plan
+from procedures.mission.requires import requires
 from procedures.mission.steps import LIFT, MOVE, TURN, Flight, captured, motion, radial, read
 from procedures.shared import assumptions, planned
 
@@ -186,22 +186,6 @@ def _memory(rig: RigFile, plan: Plan) -> Iterator[str]:
 def figures(results: Results, recording: Recording[Plan]) -> Iterable[Figure]:
     """Readings with the gate, place and angle, the bearings' currents."""
     return drawn.all_figures(results.flight, results.told, recording.rig, results.plan)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig's machine has."""
-    if rig.capabilities.motion is None:
-        return Requires(capabilities=("motion", "settings.observer"))
-    at = motion(rig)
-    probes = radial(rig)
-    lacks = () if probes else ("probes: found none across the shaft; expected the radial ones",)
-    return Requires(
-        channels=(*probes.values(), at.place_channel, at.angle_channel),
-        sensors=(*probes.values(), at.place_channel),
-        capture=(*probes.values(), at.place_channel, at.angle_channel, *at.currents),
-        capabilities=("motion", "settings.observer", "motion.gate", "motion.gate_time"),
-        lacks=lacks,
-    )
 
 
 procedure = Procedure(

@@ -15,19 +15,18 @@ import numpy as np
 from bench.figures import Shown
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
-from bench.rigfile.roles import STATE
 from bench.rigfile.stage import axes_of
 from procedures.positioning import checks, estimates
 from procedures.positioning import figures as drawn
 from procedures.positioning.estimates import Result
 from procedures.positioning.plan import Plan
+from procedures.positioning.requires import COUNTER, requires
 from procedures.positioning.standard import FIGURES
 from procedures.positioning.steps import READ, READING, REST, read_taken
 from procedures.positioning.targets import UP, Approach, cycle, fewest
@@ -53,8 +52,6 @@ AROUND = tuple(
     Quantity(f"{n}_angle", "rad", f"{WORDS[n][1]} (ISO 230-2)", title=f"{WORDS[n][0]} around") for n in FIGURES
 )
 MEASURES = (*ALONG, *AROUND)
-COUNTER = "without one outside the loop only the repeatability of a counter could be told, and that is no accuracy"
-NONE = f"capabilities.reference: found no reference instrument of an axis; {COUNTER}"
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
@@ -134,20 +131,6 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     yield from envelope.problems_of(rates(rig, plan))
     if plan.rest_s > plan.dwell_s:
         yield f"rest_s: found {plan.rest_s:g} s; expected no more than dwell_s, {plan.dwell_s:g} s"
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig has."""
-    if rig.capabilities.positioning is None:
-        return Requires(roles=("motion",), capabilities=("positioning",))
-    some = readable(rig)
-    asked = any(not rig.capabilities.reference[name].channel for name in some)
-    return Requires(
-        roles=("motion", "operator") if asked else ("motion",),
-        channels=(STATE, *(axis.channel for axis in some.values())),
-        capabilities=("positioning", "reference") if some else ("positioning",),
-        lacks=() if some else (NONE,),
-    )
 
 
 def untold(rig: RigFile) -> tuple[Quantity, ...]:

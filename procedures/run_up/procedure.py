@@ -7,14 +7,12 @@ critical speeds, their amplification factors, and how far they stand off the run
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
 from typing import Any
 
 from bench.errors import AnalysisError, BenchError
 from bench.figures import Shown
 from bench.findings import Effect, Finding, Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
@@ -30,6 +28,7 @@ from procedures.run_up import checks, estimates
 from procedures.run_up import figures as drawn
 from procedures.run_up.estimates import Run
 from procedures.run_up.plan import Passing, Plan
+from procedures.run_up.requires import requires
 from procedures.run_up.steps import MISSED, PASSAGE, read_passage
 from procedures.shared import assumptions, first_look
 from procedures.shared.rates import rate_of
@@ -223,12 +222,6 @@ def check(rig: RigFile, plan: Passing) -> Iterable[str]:
 def figures(run: Run, recording: Recording[Any]) -> Iterable[Shown]:
     """Bode pairs, polar plots, waterfall, order map, coil use, orbits."""
     return drawn.all_figures(run, recording.rig, recording.plan.running_rad_s)
-
-
-def requires(rig: RigFile) -> Requires:
-    """What the unbalance response needs; the greatest coil voltage of each bearing is shown where it is told."""
-    needed, told = unbalance.requires(rig), conventions(rig).plane_voltages
-    return replace(needed, channels=(*needed.channels, *told), uses=(*needed.uses, "flatness", "gains"))
 
 
 procedure = Procedure(

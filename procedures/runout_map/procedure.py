@@ -14,19 +14,17 @@ from bench.errors import BenchError
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
-from bench.rigfile.roles import STATE
 from procedures.runout_map import checks, estimates
 from procedures.runout_map import figures as drawn
 from procedures.runout_map.estimates import Results
 from procedures.runout_map.plan import Plan
-from procedures.runout_map.planes import planes
+from procedures.runout_map.requires import requires
 from procedures.runout_map.steps import TURN, read_turns
 from procedures.shared import assumptions, planned
 
@@ -136,25 +134,6 @@ def figures(results: Results, recording: Recording[Plan]) -> Iterable[Figure]:
     """The vectors."""
     del recording
     return drawn.all_figures(results)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig has."""
-    motion, of = rig.capabilities.motion, planes(rig)
-    if motion is None or rig.capabilities.hold is None:
-        return Requires(capabilities=("hold", "motion"))
-    lacks = [] if of else ["capabilities.hold.axes: found none of two axes, or no [shaft]"]
-    return Requires(
-        channels=(
-            motion.angle_channel,
-            motion.place_channel,
-            STATE,
-            *(c for p in of for c in (*p.positions, *p.currents)),
-        ),
-        sensors=tuple(c for p in of if p.motor for c in rig.motors[p.motor].currents),
-        capabilities=("hold", "motion"),
-        lacks=tuple(lacks),
-    )
 
 
 procedure = Procedure(

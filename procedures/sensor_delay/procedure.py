@@ -12,19 +12,18 @@ from itertools import count
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
-from bench.rigfile.roles import STATE
 from procedures.position_loops.injection import BELOW, FORCE, Sine, ability, injected, parameters_of
 from procedures.sensor_delay import checks, estimates
 from procedures.sensor_delay import figures as drawn
 from procedures.sensor_delay.estimates import Result
 from procedures.sensor_delay.plan import Plan
+from procedures.sensor_delay.requires import requires
 from procedures.sensor_delay.sines import captured, probes, rate, sines
 from procedures.sensor_delay.steps import SINE, read_taken
 from procedures.shared import assumptions, planned
@@ -109,16 +108,6 @@ def figures(results: Sequence[Result], recording: Recording[Plan]) -> Iterable[F
     """Phases over the frequency."""
     del recording
     return drawn.all_figures(results)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig has."""
-    wanted, can, some = ("loop_injection", "hold"), rig.capabilities.loop_injection, probes(rig)
-    if can is None or rig.capabilities.hold is None:
-        return Requires(capabilities=wanted, capture=())
-    lacks = [] if FORCE in can.places else ["capabilities.loop_injection.places: found no force"]
-    lacks += [] if some else ["capabilities.loop_injection.loops: found none of a position of capabilities.hold.axes"]
-    return Requires(channels=(STATE,), capabilities=wanted, capture=captured(rig), lacks=tuple(lacks))
 
 
 procedure = Procedure(

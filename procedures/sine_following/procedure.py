@@ -11,7 +11,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
@@ -22,6 +21,7 @@ from procedures.sine_following import checks, estimates
 from procedures.sine_following import figures as drawn
 from procedures.sine_following.estimates import LAG, LARGEST, RATIO, RMS, TRUE, Results
 from procedures.sine_following.plan import Plan
+from procedures.sine_following.requires import requires
 from procedures.sine_following.steps import SINE, amplitude, modes_of, read
 from procedures.stages import assumptions, tracks
 from procedures.stages.tracks import TOGETHER, Mode, chosen, sisters, waits_at
@@ -116,15 +116,6 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 def figures(found: Results, recording: Recording[Plan]) -> Iterable[Figure]:
     """Set point and reading over a period, and the error."""
     return drawn.all_figures(found, recording.plan)
-
-
-def requires(rig: RigFile) -> Requires:
-    """A positioned stage whose controller gives sines."""
-    found = tracks.requires(rig, ("wave",))
-    lacks = [f"capabilities.positioning.axes.{a.name}.wave: found no sine" for a in chosen(rig, "all")
-             if a.wave is not None and a.wave.sine is None]  # fmt: skip
-    return Requires(found.roles, found.channels, capabilities=found.capabilities, uses=found.uses,
-                    lacks=(*found.lacks, *lacks))  # fmt: skip
 
 
 procedure = Procedure(

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from bench.figures import Figure
 from bench.findings import Finding, Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.procedure.states import transition
@@ -22,15 +21,16 @@ from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
 from procedures.servomotor import carrying, hold, segments, wiring
 from procedures.servomotor.conventions import conventions
-from procedures.servomotor.parameters import BIASES, chosen, named, needed, write
+from procedures.servomotor.parameters import BIASES, chosen, named, write
 from procedures.shared import assumptions
 from procedures.spindown import checks, coasting, estimates, waves
 from procedures.spindown import figures as drawn
 from procedures.spindown.coasting import Coasted
 from procedures.spindown.estimates import Drag
 from procedures.spindown.plan import Plan
+from procedures.spindown.requires import requires
 from procedures.spindown.running_down import SLOW, run_down
-from procedures.spindown.steps import RunDown, channels, coils, read_run_downs
+from procedures.spindown.steps import RunDown, read_run_downs
 
 B = Quantity("B", "N m s/rad", "viscous drag, mean over the directions that it was turned in")
 B_HIGH = Quantity(
@@ -209,20 +209,6 @@ def figures(a: Analysis | Coasted, recording: Recording[Plan]) -> Iterable[Figur
     if isinstance(a, Coasted):
         return coasting.figures(a)
     return drawn.all_figures(a.runs, a.angle, recording.plan.speed_rad_s)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig's machine has."""
-    if coasting.applies(rig):
-        return coasting.requires(rig)
-    machine = conventions(rig)
-    return Requires(
-        lacks=machine.lacks,
-        roles=("levitation", "rotation"),
-        channels=channels(machine),
-        sensors=coils(machine),
-        parameters=needed(rig, *hold.NEEDED, *BIASES, "angle.speed"),
-    )
 
 
 procedure = Procedure(

@@ -13,7 +13,6 @@ from bench.errors import NotReached
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
@@ -28,9 +27,10 @@ from procedures.step import capturing, checks, estimates, hum, planes, slewing
 from procedures.step import figures as drawn
 from procedures.step.estimates import Result
 from procedures.step.plan import Plan
-from procedures.step.position import is_plain, leans
+from procedures.step.position import leans
 from procedures.step.record_length import enough_s, faded_s
-from procedures.step.steps import STEP, TURNING_RAD_S, Case, Done, cases, channels, read_steps
+from procedures.step.requires import requires
+from procedures.step.steps import STEP, TURNING_RAD_S, Case, Done, cases, read_steps
 
 OVERSHOOT = Quantity("overshoot", "1", "greatest position beyond the step, as a share of it")
 RISE = Quantity("rise_time", "s", "10 to 90 % of the step")
@@ -241,26 +241,6 @@ def figures(results: Results, recording: Recording[Plan]) -> Iterable[Figure]:
     ended with them."""
     del recording
     return drawn.all_figures(results.steps, results.by_case) if results.by_case else drawn.raw_figures(results.steps)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig's machine has."""
-    machine = conventions(rig)
-    read = channels(machine)
-    return Requires(
-        lacks=machine.lacks if is_plain(rig) else (*machine.lacks, *machine.stations.lacks),
-        channels=read,
-        sensors=capturing.channels(machine),
-        capabilities=("set_points",),
-        uses=(
-            "settings.law",
-            "gains",
-            "bias",
-            "model",
-            "mark",
-            *(["capture"] if capturing.captures(rig, machine) else []),
-        ),
-    )
 
 
 procedure = Procedure(

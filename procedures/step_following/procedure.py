@@ -12,7 +12,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
@@ -24,6 +23,7 @@ from procedures.step_following import checks, estimates
 from procedures.step_following import figures as drawn
 from procedures.step_following.estimates import ERROR, OVER, TIME, TRUE, Results
 from procedures.step_following.plan import Plan
+from procedures.step_following.requires import requires
 from procedures.step_following.steps import DOWN, STEP, UP, modes_of, places, read, targets
 
 STATIC = sisters(ERROR, "where the axis stands beyond its set point, by the encoder's own scale, mean over repeats")
@@ -101,11 +101,6 @@ def figures(found: Results, recording: Recording[Plan]) -> Iterable[Figure]:
 def steps_on(rig: RigFile, plan: Plan) -> int:
     """Of all modes."""
     return 2 * (plan.lead + plan.repeats) * len(modes_of(rig, plan))
-
-
-def requires(rig: RigFile) -> Requires:
-    """As any positioned stage."""
-    return tracks.requires(rig)
 
 
 procedure = Procedure(

@@ -13,7 +13,6 @@ from bench.errors import BenchError
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
@@ -21,13 +20,13 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.capture import rises
 from bench.rigfile.envelope import Envelope
-from bench.rigfile.roles import STATE
 from procedures.shared import assumptions, planned
 from procedures.unstable_pole import checks, estimates
 from procedures.unstable_pole import figures as drawn
 from procedures.unstable_pole.estimates import Result
 from procedures.unstable_pole.hold import SPARE, ability, captured, chosen, foreseen, place, rate
 from procedures.unstable_pole.plan import Plan
+from procedures.unstable_pole.requires import requires
 from procedures.unstable_pole.steps import STEP, read_taken
 
 POLE = Quantity("pole", "1/s", "how fast both planes leave their place together, held currents: sqrt((K_1 + K_2)/m)",
@@ -152,22 +151,6 @@ def _caught(rig: RigFile, plan: Plan, axis: str) -> Iterator[str]:
     limit = rig.envelope.max_levitated_position_m
     if max(f.travel, f.at_bound) > limit:
         yield f"bound_m: a shot goes {max(f.travel, f.at_bound) * 1e6:.0f} µm; the envelope allows {limit * 1e6:g} µm"
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig has."""
-    if rig.capabilities.hold is None:
-        return Requires(capabilities=("hold",), capture=())
-    named = {probe.channel for probe in rig.probes.values()}
-    without = [c for axis in ability(rig).axes.values() for c in axis.positions if c not in named]
-    lacks = (f"probes: found none of {', '.join(without)}; expected where they are along the shaft",) if without else ()
-    return Requires(
-        channels=(STATE,),
-        capabilities=("hold",),
-        capture=captured(rig),
-        uses=("settings.observer", "motion"),
-        lacks=lacks,
-    )
 
 
 procedure = Procedure(

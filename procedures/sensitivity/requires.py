@@ -1,0 +1,27 @@
+"""What it needs of a rig, and what it reads of it."""
+
+from __future__ import annotations
+
+from bench.procedure.requires import Requires
+from bench.rigfile import RigFile
+from bench.rigfile.recorded import AGE, COUNT
+from procedures.amb_rotor import lift
+from procedures.amb_rotor.conventions import conventions
+from procedures.sensitivity.steps import LOOP, telemetry_channels
+
+
+def requires(rig: RigFile) -> Requires:
+    """By the names that the rig's machine has."""
+    machine = conventions(rig)
+    moves = machine.unmoved([c for c, _ in lift.NUDGES])
+    return Requires(
+        lacks=(*machine.stations.lacks, *moves),
+        channels=telemetry_channels(machine),
+        capabilities=("set_points", "injection"),
+        capture=(
+            *LOOP,
+            *((machine.pulsed or (COUNT, AGE)) if machine.marked else ()),
+            *machine.all_currents,
+        ),
+        uses=("settings.law", "settings.lift", "injection.lines", "injection.step", "mark"),
+    )

@@ -1,0 +1,30 @@
+"""What it needs of a rig, and what it reads of it."""
+
+from __future__ import annotations
+
+from bench.procedure.requires import Requires
+from bench.rigfile import RigFile
+from procedures.amb_rotor.conventions import conventions
+from procedures.step import capturing
+from procedures.step.position import is_plain
+from procedures.step.steps import channels
+
+
+def requires(rig: RigFile) -> Requires:
+    """By the names that the rig's machine has."""
+    machine = conventions(rig)
+    read = channels(machine)
+    return Requires(
+        lacks=machine.lacks if is_plain(rig) else (*machine.lacks, *machine.stations.lacks),
+        channels=read,
+        sensors=capturing.channels(machine),
+        capabilities=("set_points",),
+        uses=(
+            "settings.law",
+            "gains",
+            "bias",
+            "model",
+            "mark",
+            *(["capture"] if capturing.captures(rig, machine) else []),
+        ),
+    )
