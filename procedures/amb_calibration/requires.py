@@ -6,8 +6,7 @@ from bench.procedure.requires import Requires
 from bench.rigfile import RigFile
 from bench.rigfile.roles import STATUS
 from procedures.amb_calibration import turns
-from procedures.amb_calibration.pulls import pulls
-from procedures.amb_calibration.steps import channels
+from procedures.amb_calibration.pulls import channels, pulls
 
 
 def requires(rig: RigFile) -> Requires:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from bench.procedure.requires import Requires
 from bench.rigfile import RigFile
+from bench.rigfile.roles import ANGLE, STATUS
 from procedures.angle_step import bounds
-from procedures.angle_step.steps import channels, positions
 from procedures.servomotor import hold, wiring
-from procedures.servomotor.conventions import conventions
+from procedures.servomotor.conventions import Servomotor, conventions
 from procedures.servomotor.parameters import needed
 
 NEEDED = (
@@ -20,6 +20,16 @@ NEEDED = (
     "angle.derivative_on_error",
     "angle.slew",
 )
+
+
+def positions(machine: Servomotor) -> tuple[str, ...]:
+    """Where the shaft is, inboard first."""
+    return machine.positions_of("xi", "yi", "xo", "yo")
+
+
+def channels(machine: Servomotor) -> tuple[str, ...]:
+    """What is recorded of a step."""
+    return (ANGLE, *positions(machine), *machine.segments, STATUS)
 
 
 def requires(rig: RigFile) -> Requires:

@@ -24,8 +24,8 @@ from procedures.estimator_compare import figures as drawn
 from procedures.estimator_compare.estimates import Result
 from procedures.estimator_compare.observers import predicted_ratio
 from procedures.estimator_compare.plan import Plan
-from procedures.estimator_compare.requires import requires
-from procedures.estimator_compare.steps import ENGAGE, HANG, captured, read_taken
+from procedures.estimator_compare.requires import ENGAGE, HANG, captured, requires
+from procedures.estimator_compare.steps import read_taken
 from procedures.one_axis.bank import RULES, Array, bank
 from procedures.one_axis.conventions import OneAxis, conventions
 from procedures.shared import assumptions

@@ -5,8 +5,14 @@ from __future__ import annotations
 from bench.procedure.requires import Requires
 from bench.rigfile import RigFile
 from bench.rigfile.roles import STATUS
-from procedures.estimator_compare.steps import ENGAGE, captured
-from procedures.one_axis.conventions import conventions
+from procedures.one_axis.conventions import HARMONIC, LOAD, OneAxis, conventions
+
+ENGAGE, HANG = "engage", "hang"
+
+
+def captured(machine: OneAxis, kind: str) -> tuple[str, ...]:
+    """What is captured."""
+    return (*machine.captured, *((LOAD, HARMONIC, *machine.currents) if kind == ENGAGE else ()))
 
 
 def requires(rig: RigFile) -> Requires:

@@ -32,8 +32,8 @@ from procedures.force_constant.first_angle import CALIBRATION
 from procedures.force_constant.fit import TIME
 from procedures.force_constant.fitting import check
 from procedures.force_constant.plan import Plan
-from procedures.force_constant.requires import requires
-from procedures.force_constant.steps import AtLevel, RampData, channels, read_ramps
+from procedures.force_constant.requires import channels, requires
+from procedures.force_constant.steps import AtLevel, RampData, read_ramps
 from procedures.servomotor.conventions import conventions
 from procedures.servomotor.facts import of_ends
 from procedures.servomotor.parameters import BIASES, CURRENTS, named, write

@@ -5,10 +5,16 @@ from __future__ import annotations
 from bench.procedure.requires import Requires
 from bench.rigfile import RigFile
 from bench.rigfile.roles import STATUS
-from procedures.force_constant.steps import AXES, channels
-from procedures.servomotor.conventions import conventions
+from procedures.servomotor.conventions import Servomotor, conventions
 from procedures.servomotor.parameters import BIASES, needed
 from procedures.shared.unsupported import of_motors
+
+AXES = ("yi", "yo", "xi", "xo")
+
+
+def channels(machine: Servomotor) -> tuple[str, ...]:
+    """What is recorded at a level, besides the flags."""
+    return (*machine.coils_of(*AXES), *machine.segments, *machine.positions_of(*AXES))
 
 
 def requires(rig: RigFile) -> Requires:

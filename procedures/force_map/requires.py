@@ -5,14 +5,23 @@ from __future__ import annotations
 from bench.procedure.requires import Requires
 from bench.rigfile import RigFile
 from bench.rigfile.roles import STATUS
-from procedures.force_map.steps import channels, positions
 from procedures.servomotor import hold, wiring
-from procedures.servomotor.conventions import conventions
+from procedures.servomotor.conventions import Servomotor, conventions
 from procedures.servomotor.parameters import BIASES, needed
 from procedures.shared.unsupported import of_motors
 
 NEEDED = ("motor.ramp", *BIASES, "at.xi", "at.yi", "at.xo", "at.yo")
 GEOMETRY = ("amb_span", "motor_to_outboard_amb", "amb_gap", "lever_left", "lever_right")
+
+
+def positions(machine: Servomotor) -> tuple[str, ...]:
+    """Where the shaft is, inboard first."""
+    return machine.positions_of("xi", "yi", "xo", "yo")
+
+
+def channels(machine: Servomotor) -> tuple[str, ...]:
+    """What is recorded at a point, besides the flags."""
+    return (*machine.coils["yi"], *positions(machine), *machine.segments)
 
 
 def requires(rig: RigFile) -> Requires:

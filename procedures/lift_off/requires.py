@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from bench.procedure.requires import Requires
 from bench.rigfile import RigFile
-from bench.rigfile.roles import STATUS
-from procedures.lift_off.steps import channels
-from procedures.servomotor.conventions import conventions
+from bench.rigfile.roles import ANGLE, STATUS
+from procedures.servomotor.conventions import Servomotor, conventions
 from procedures.servomotor.parameters import needed
+from procedures.servomotor.steps import POSITIONS
 
 GEOMETRY = ("clearance", "com_to_inboard_amb", "com_to_inboard_sensor", "com_to_motor", "com_to_outboard_amb",
             "com_to_outboard_sensor", "motor_to_outboard_amb")  # fmt: skip
 NEEDED = ("motor.phase", "motor.phase_slew", "motor.segment_limit")
+
+
+def channels(machine: Servomotor) -> tuple[str, ...]:
+    """What is read of every step."""
+    return (*machine.positions_of(*POSITIONS), *machine.segments, ANGLE)
 
 
 def requires(rig: RigFile) -> Requires:

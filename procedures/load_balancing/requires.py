@@ -4,15 +4,25 @@ from __future__ import annotations
 
 from bench.procedure.requires import Requires
 from bench.rigfile import RigFile
+from bench.rigfile.roles import ANGLE, STATUS
 from procedures.load_balancing import inputs
-from procedures.load_balancing.steps import channels, positions
 from procedures.servomotor import hold, wiring
-from procedures.servomotor.conventions import LOADS, PHASE, conventions
+from procedures.servomotor.conventions import LOADS, PHASE, Servomotor, conventions
 from procedures.servomotor.parameters import needed
 from procedures.shared.unsupported import of_motors
 
 NEEDED = ("motor.share", "motor.share_slew", "motor.segment_limit", "motor.ramp", "motor.phase", "motor.phase_slew",
           "motor.phase_limit", "motor.circle", "motor.circle_hz", "angle.ref")  # fmt: skip
+
+
+def positions(machine: Servomotor) -> tuple[str, ...]:
+    """Where the end is that goes around."""
+    return machine.positions_of("xo", "yo")
+
+
+def channels(machine: Servomotor) -> tuple[str, ...]:
+    """What is recorded of a turn."""
+    return (*positions(machine), *machine.segments, ANGLE, STATUS)
 
 
 def requires(rig: RigFile) -> Requires:

@@ -25,8 +25,8 @@ from procedures.mission import checks, estimates
 from procedures.mission import figures as drawn
 from procedures.mission.estimates import Told
 from procedures.mission.plan import Plan
-from procedures.mission.requires import requires
-from procedures.mission.steps import LIFT, MOVE, TURN, Flight, captured, motion, radial, read
+from procedures.mission.requires import motion, radial, requires
+from procedures.mission.steps import LIFT, MOVE, TURN, Flight, captured, read
 from procedures.shared import assumptions, planned
 
 PEAK = Quantity("peak_reading", "m", "largest distance from the probe's zero during the moves, without noise")

@@ -26,11 +26,11 @@ from procedures.positioning import checks, estimates
 from procedures.positioning import figures as drawn
 from procedures.positioning.estimates import Result
 from procedures.positioning.plan import Plan
-from procedures.positioning.requires import COUNTER, requires
+from procedures.positioning.requires import COUNTER, readable, requires
 from procedures.positioning.standard import FIGURES
 from procedures.positioning.steps import READ, READING, REST, read_taken
 from procedures.positioning.targets import UP, Approach, cycle, fewest
-from procedures.positioning.way import Tested, rates, readable, tested
+from procedures.positioning.way import Tested, rates, tested
 from procedures.stages import assumptions
 
 WORDS = {

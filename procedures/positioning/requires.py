@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from bench.procedure.requires import Requires
 from bench.rigfile import RigFile
 from bench.rigfile.roles import STATE
-from procedures.positioning.way import readable
+from bench.rigfile.stage import StageAxis, axes_of
 
 COUNTER = "without one outside the loop only the repeatability of a counter could be told, and that is no accuracy"
 NONE = f"capabilities.reference: found no reference instrument of an axis; {COUNTER}"
+
+
+def readable(rig: RigFile) -> Mapping[str, StageAxis]:
+    """Axes that are positioned and read by a reference instrument, by name."""
+    return {name: axis for name, axis in axes_of(rig).items() if name in rig.capabilities.reference}
 
 
 def requires(rig: RigFile) -> Requires:

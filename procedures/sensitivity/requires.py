@@ -5,9 +5,21 @@ from __future__ import annotations
 from bench.procedure.requires import Requires
 from bench.rigfile import RigFile
 from bench.rigfile.recorded import AGE, COUNT
+from bench.rigfile.roles import SPEED, STATUS
 from procedures.amb_rotor import lift
 from procedures.amb_rotor.conventions import conventions
-from procedures.sensitivity.steps import LOOP, telemetry_channels
+from procedures.amb_rotor.machine import AmbRotor
+
+LOOP = ("inject", "before", "after")
+
+
+def telemetry_channels(machine: AmbRotor) -> tuple[str, ...]:
+    """What is read of the telemetry."""
+    return (*machine.stations.channels, *_axial(machine), STATUS, *((SPEED,) if machine.marked else ()))
+
+
+def _axial(machine: AmbRotor) -> tuple[str, ...]:
+    return (machine.position(machine.axial),) if machine.axial in machine.probes else ()
 
 
 def requires(rig: RigFile) -> Requires:

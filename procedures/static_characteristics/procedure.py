@@ -32,8 +32,8 @@ from procedures.static_characteristics.beside import Beside, by_flux, of_control
 from procedures.static_characteristics.estimates import Result
 from procedures.static_characteristics.places import SIDES, Load, grid, loads, repeated
 from procedures.static_characteristics.plan import Plan
-from procedures.static_characteristics.requires import requires
-from procedures.static_characteristics.steps import READ, READING, Cell, cells, read_taken
+from procedures.static_characteristics.requires import Cell, cells, requires
+from procedures.static_characteristics.steps import READ, READING, read_taken
 
 PART = "cells"
 MAP = "inductance-map"

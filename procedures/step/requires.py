@@ -4,10 +4,21 @@ from __future__ import annotations
 
 from bench.procedure.requires import Requires
 from bench.rigfile import RigFile
+from bench.rigfile.roles import ANGLE, SPEED, STATUS
 from procedures.amb_rotor.conventions import conventions
+from procedures.amb_rotor.machine import AmbRotor
 from procedures.step import capturing
 from procedures.step.position import is_plain
-from procedures.step.steps import channels
+
+
+def channels(machine: AmbRotor) -> tuple[str, ...]:
+    """What is read of a step."""
+    return (*capturing.channels(machine), *marked(machine), STATUS)
+
+
+def marked(machine: AmbRotor) -> tuple[str, ...]:
+    """Roles that tell how the shaft turns, where the rig has them."""
+    return (ANGLE, SPEED) if machine.marked else ()
 
 
 def requires(rig: RigFile) -> Requires:

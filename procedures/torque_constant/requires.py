@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from bench.procedure.requires import Requires
 from bench.rigfile import RigFile
+from bench.rigfile.roles import ANGLE, STATUS
 from procedures.servomotor import hold
-from procedures.servomotor.conventions import conventions
+from procedures.servomotor.conventions import Servomotor, conventions
 from procedures.servomotor.parameters import BIASES, needed
 from procedures.torque_constant.inputs import SIDES
-from procedures.torque_constant.steps import channels
+
+
+def channels(machine: Servomotor) -> tuple[str, ...]:
+    """What is recorded while loads hang on the lever."""
+    return (ANGLE, *machine.segments, *machine.coils_of("xo", "yo"), STATUS)
 
 
 def requires(rig: RigFile) -> Requires:
