@@ -6,9 +6,9 @@ from bench.procedure.requires import Requires
 from bench.rigfile import RigFile
 from bench.rigfile.recorded import AGE, COUNT
 from bench.rigfile.roles import SPEED, STATUS
-from procedures.amb_rotor import lift
 from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.machine import AmbRotor
+from procedures.amb_rotor.stations import NUDGES
 
 LOOP = ("inject", "before", "after")
 
@@ -25,7 +25,7 @@ def _axial(machine: AmbRotor) -> tuple[str, ...]:
 def requires(rig: RigFile) -> Requires:
     """By the names that the rig's machine has."""
     machine = conventions(rig)
-    moves = machine.unmoved([c for c, _ in lift.NUDGES])
+    moves = machine.unmoved([c for c, _ in NUDGES])
     return Requires(
         lacks=(*machine.stations.lacks, *moves),
         channels=telemetry_channels(machine),

@@ -28,7 +28,7 @@ from procedures.spindown import figures as drawn
 from procedures.spindown.coasting import Coasted
 from procedures.spindown.estimates import Drag
 from procedures.spindown.plan import Plan
-from procedures.spindown.requires import requires
+from procedures.spindown.requires import by_drive, requires
 from procedures.spindown.running_down import SLOW, run_down
 from procedures.spindown.steps import RunDown, read_run_downs
 
@@ -44,7 +44,7 @@ BY_SPEED, CARRIED = "by the speed channel", "motor carries"
 
 def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
     """Lifted at the first bias and with the angle released: no loop is closed before the encoder's direction is known."""
-    if coasting.applies(rig):
+    if by_drive(rig):
         return coasting.settings(rig)
     return named(rig, {**dict.fromkeys(BIASES, plan.bias_A), **hold.RELEASED})
 
@@ -69,7 +69,7 @@ def fewest_steps(plan: Plan) -> int:
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Run down in both directions at both biases, and with the ring; the angle is held again in the end. Where the rig has no
     motor, as `coasting`."""
-    if coasting.applies(rig.file):
+    if by_drive(rig.file):
         coasting.acquire(rig, plan, record)
         return
     hold.probe(rig, record)
@@ -133,7 +133,7 @@ class Analysis:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis | Coasted:
     """The run-downs, evaluated by the angle and by the speed; where the rig has no motor, as `coasting`."""
-    if coasting.applies(recording.rig):
+    if by_drive(recording.rig):
         return coasting.evaluate(recording, findings)
     findings.gate([*checks.before_fits(recording), *segments.of_nudges(recording)])
     plan, rig, runs = recording.plan, recording.rig, read_run_downs(recording)
@@ -183,7 +183,7 @@ def holds_for(plan: Plan) -> dict[str, float]:
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
-    if coasting.applies(rig):
+    if by_drive(rig):
         yield from coasting.check(rig, plan)
         return
     needed = ["ring_inertia"] if plan.added_inertia else ["polar_inertia"]
@@ -227,8 +227,8 @@ procedure = Procedure(
     settings=settings,
     step_count=step_count,
     fewest_steps=fewest_steps,
-    steps_on=lambda rig, plan: coasting.steps(plan) if coasting.applies(rig) else step_count(plan),
-    untold=lambda rig: (B_HIGH,) if coasting.applies(rig) else (),  # there at the bias that the controller has
+    steps_on=lambda rig, plan: coasting.steps(plan) if by_drive(rig) else step_count(plan),
+    untold=lambda rig: (B_HIGH,) if by_drive(rig) else (),  # there at the bias that the controller has
     facts=facts,
     holds_for=holds_for,
     assumes=assumptions.SPINDOWN,

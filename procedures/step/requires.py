@@ -8,7 +8,7 @@ from bench.rigfile.roles import ANGLE, SPEED, STATUS
 from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.machine import AmbRotor
 from procedures.step import capturing
-from procedures.step.position import is_plain
+from procedures.step.probes import is_plain
 
 
 def channels(machine: AmbRotor) -> tuple[str, ...]:
