@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from bench.figures import Figure
 from bench.findings import Findings
@@ -19,9 +20,7 @@ from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from procedures.angle_step import bounds, checks, estimates, response
-from procedures.angle_step import figures as drawn
-from procedures.angle_step.estimates import Result
+from procedures.angle_step import bounds, response
 from procedures.angle_step.plan import Plan
 from procedures.angle_step.requires import requires
 from procedures.angle_step.response import Loop
@@ -30,6 +29,9 @@ from procedures.servomotor import carrying, hold, segments, wiring
 from procedures.servomotor.conventions import conventions
 from procedures.servomotor.parameters import named, stated, write
 from procedures.shared import assumptions
+
+if TYPE_CHECKING:
+    from procedures.angle_step.estimates import Result
 
 RISE = Quantity("rise_time", "s", "10 to 90 % of the step of the angle")
 OVERSHOOT = Quantity("overshoot", "1", "greatest angle beyond the step, as a share of it")
@@ -144,6 +146,8 @@ class Results:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     """The response of each case."""
+    from procedures.angle_step import checks, estimates
+
     findings.gate(segments.before_carrying(recording))
     plan, rig = recording.plan, recording.rig
     moves = read_moves(recording)
@@ -195,6 +199,8 @@ def _too_fast(rig: RigFile, plan: Plan) -> Iterator[str]:
 
 def figures(results: Results, recording: Recording[Plan]) -> Iterable[Figure]:
     """Orbits, angle and segment currents of the largest step, and peaks over the cases."""
+    from procedures.angle_step import figures as drawn
+
     return drawn.all_figures(results.moves, results.by_case, recording.rig)
 
 

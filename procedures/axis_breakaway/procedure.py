@@ -7,6 +7,7 @@ give way, as a share of one friction along the path.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
 
 from bench.errors import AnalysisError
 from bench.figures import Figure
@@ -17,9 +18,6 @@ from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
 from bench.rigfile.stage import axes_of
-from procedures.axis_breakaway import checks, estimates
-from procedures.axis_breakaway import figures as drawn
-from procedures.axis_breakaway.estimates import Result
 from procedures.axis_breakaway.moves import acquire
 from procedures.axis_breakaway.plan import Plan
 from procedures.axis_breakaway.requires import requires
@@ -40,6 +38,9 @@ from procedures.axis_breakaway.steps import read_ramps
 from procedures.shared.default_masses import nth_lightest
 from procedures.stages import assumptions
 
+if TYPE_CHECKING:
+    from procedures.axis_breakaway.estimates import Result
+
 STICKS = "force at which it begins to move, raised slowly, mean of both ways"
 MEASURES = (
     Quantity("breakaway", "N", STICKS),
@@ -52,6 +53,8 @@ MEASURES = (
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     """Breakaway of each axis, and of both."""
+    from procedures.axis_breakaway import checks, estimates
+
     rig, plan = recording.rig, recording.plan
     try:
         ramps = read_ramps(recording)
@@ -65,6 +68,8 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
 
 def measured(r: Result) -> Iterator[Measured]:
     """The quantities, kind by kind."""
+    from procedures.axis_breakaway import estimates
+
     for quantity in MEASURES:
         for (name, where), estimate in r.estimates.items():
             if name == quantity.name:
@@ -73,6 +78,8 @@ def measured(r: Result) -> Iterator[Measured]:
 
 def figures(r: Result, recording: Recording[Plan]) -> Iterable[Figure]:
     """The circle and repeats."""
+    from procedures.axis_breakaway import figures as drawn
+
     del recording
     return drawn.all_figures(r)
 

@@ -7,6 +7,7 @@ of the one friction along the path of the surface where both axes move.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
 
 from bench.errors import AnalysisError
 from bench.figures import Figure
@@ -17,9 +18,6 @@ from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
 from bench.rigfile.stage import axes_of
-from procedures.axis_friction import checks, estimates
-from procedures.axis_friction import figures as drawn
-from procedures.axis_friction.estimates import Result
 from procedures.axis_friction.moves import acquire
 from procedures.axis_friction.plan import Plan
 from procedures.axis_friction.requires import requires
@@ -42,6 +40,9 @@ from procedures.axis_friction.steps import read_passes
 from procedures.shared.default_masses import nth_lightest
 from procedures.stages import assumptions
 
+if TYPE_CHECKING:
+    from procedures.axis_friction.estimates import Result
+
 DRY = "friction at no speed, by a line over constant rates, mean of both ways"
 WET = "slope of friction over the rate, mean of both ways"
 ALIKE = "force that it needs both ways alike: its tilt, and half of what friction is more upwards than downwards"
@@ -58,6 +59,8 @@ MEASURES = (
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     """Friction, and the radius."""
+    from procedures.axis_friction import checks, estimates
+
     rig, plan = recording.rig, recording.plan
     try:
         passes = read_passes(recording)
@@ -79,6 +82,8 @@ def measured(r: Result) -> Iterator[Measured]:
 
 def figures(r: Result, recording: Recording[Plan]) -> Iterable[Figure]:
     """Friction over rates and ratios."""
+    from procedures.axis_friction import figures as drawn
+
     return drawn.all_figures(r, recording.plan.scale)
 
 

@@ -6,6 +6,7 @@ Measurands, by axis: mass along, kg, or moment of inertia around, kg m^2, of the
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
 
 from bench.errors import AnalysisError
 from bench.figures import Figure
@@ -16,9 +17,6 @@ from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
 from bench.rigfile.stage import axes_of
-from procedures.axis_inertia import checks, estimates
-from procedures.axis_inertia import figures as drawn
-from procedures.axis_inertia.estimates import Result
 from procedures.axis_inertia.moves import acquire
 from procedures.axis_inertia.plan import Plan
 from procedures.axis_inertia.requires import requires
@@ -28,6 +26,9 @@ from procedures.axis_inertia.steps import read_sines
 from procedures.stages import assumptions
 from procedures.stages.spread import middle, turns
 
+if TYPE_CHECKING:
+    from procedures.axis_inertia.estimates import Result
+
 MASS = Quantity("mass", "kg", "of what moves along an axis, by the ratio to a part of known mass")
 INERTIA = Quantity("inertia", "kg m^2", "of what turns around an axis, by the ratio to a part of known moment of inertia",
                    title="moment of inertia")  # fmt: skip
@@ -36,6 +37,8 @@ MEASURES = (MASS, INERTIA)
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     """What each axis moves."""
+    from procedures.axis_inertia import checks, estimates
+
     rig, plan = recording.rig, recording.plan
     try:
         sines = read_sines(recording)
@@ -58,6 +61,8 @@ def measured(r: Result) -> Iterator[Measured]:
 
 def figures(r: Result, recording: Recording[Plan]) -> Iterable[Figure]:
     """By repeats."""
+    from procedures.axis_inertia import figures as drawn
+
     del recording
     return drawn.all_figures(r)
 

@@ -19,8 +19,7 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
-from procedures.bearing_constant import checks, estimates
-from procedures.bearing_constant import figures as drawn
+from procedures.bearing_constant import estimates
 from procedures.bearing_constant.estimates import Result
 from procedures.bearing_constant.plan import Plan
 from procedures.bearing_constant.requires import requires
@@ -69,6 +68,8 @@ def _look(rig: Rig, plan: Plan, record: Recorder, hangs: Load, number: int) -> N
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     """Constants by all visits."""
+    from procedures.bearing_constant import checks
+
     rig, plan = recording.rig, recording.plan
     seen = read_visits(recording)
     findings.gate(checks.of_signals(seen, plan, rig))
@@ -108,6 +109,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(r: Result, recording: Recording[Plan]) -> Iterable[Figure]:
     """The current of each plane over the weight."""
+    from procedures.bearing_constant import figures as drawn
+
     del recording
     return drawn.all_figures(r)
 

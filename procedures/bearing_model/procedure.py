@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from bench.errors import DeviceFault, OperatorAbort
 from bench.figures import Figure
@@ -23,10 +24,8 @@ from bench.rigfile import RigFile
 from procedures.amb_rotor import frame, lift, liftable, pushes, rings
 from procedures.amb_rotor.conventions import AMB_ROTOR, conventions
 from procedures.amb_rotor.places import HOLD, LIFT, LIFT_LOST, REST, TILT, Held, of_readings, read_steps
-from procedures.bearing_model import checks, estimates, wiring
-from procedures.bearing_model import figures as drawn
+from procedures.bearing_model import wiring
 from procedures.bearing_model.comparison import COMPARED
-from procedures.bearing_model.estimates import Analysis
 from procedures.bearing_model.fitting import check
 from procedures.bearing_model.grid import biases, count_places, places, tilts
 from procedures.bearing_model.inputs import as_printed
@@ -35,6 +34,9 @@ from procedures.bearing_model.requires import requires
 from procedures.bearing_model.stillness import await_still
 from procedures.bearing_model.walking import Place, go
 from procedures.shared import assumptions, first_look
+
+if TYPE_CHECKING:
+    from procedures.bearing_model.estimates import Analysis
 
 OF_LINEAR = {
     "k_linear": Quantity("k_linear", "N/A", "K_i of the linear model without intercept (not a slope of the bearing)"),
@@ -186,6 +188,8 @@ def read(recording: Recording[Plan]) -> tuple[Held, Held]:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     """The adjustment of all positions, and both models compared."""
+    from procedures.bearing_model import checks, estimates
+
     findings.gate([*rings.before(recording), *pushes.of_recording(recording), *liftable.of_recording(recording)])
     held, tilted = read(recording)
     findings.gate(first_look.with_first(recording, _of_data(recording, held, tilted)), checks.FATAL)
@@ -207,6 +211,8 @@ def measured(a: Analysis) -> Iterator[Measured]:
 
 
 def _of_data(recording: Recording[Plan], held: Held, tilted: Held) -> Iterator[Finding]:
+    from procedures.bearing_model import checks
+
     plan, rig = recording.plan, recording.rig
     found = [*checks.of_signals(held, tilted, plan), *wiring.of_wiring(held, tilted, rig)]
     yield from found
@@ -216,6 +222,8 @@ def _of_data(recording: Recording[Plan], held: Held, tilted: Held) -> Iterator[F
 
 def figures(a: Analysis, recording: Recording[Plan]) -> Iterable[Figure]:
     """Positions, currents, forces by both models and residuals."""
+    from procedures.bearing_model import figures as drawn
+
     return drawn.all_figures(a, recording.rig)
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from typing import TYPE_CHECKING
 
 from bench.calibration import Need
 from bench.errors import AnalysisError, BenchError
@@ -22,9 +23,6 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
 from bench.uncertainty import Estimate
-from procedures.cogging_map import checks, estimates
-from procedures.cogging_map import figures as drawn
-from procedures.cogging_map.estimates import Result
 from procedures.cogging_map.plan import Plan
 from procedures.cogging_map.requires import DEFAULTS, requires
 from procedures.cogging_map.steps import SWEEP, read_passes
@@ -33,6 +31,9 @@ from procedures.position_loops.injection import ability
 from procedures.position_loops.motors import around
 from procedures.shared import assumptions, planned
 from procedures.synchronous.dwells import telemetry_period_s
+
+if TYPE_CHECKING:
+    from procedures.cogging_map.estimates import Result
 
 CURRENT = Quantity("cogging_current", "A", "amplitude of the first harmonic of the current that takes cogging off")
 PEAK_CURRENT = Quantity("peak_current", "A", "greatest current that takes cogging off, by its first two harmonics")
@@ -121,6 +122,8 @@ def _swept(rig: Rig, plan: Plan, of: Way) -> Iterator[None]:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> list[Result]:
     """Harmonics of each loop."""
+    from procedures.cogging_map import checks, estimates
+
     rig, plan, passes = recording.rig, recording.plan, read_passes(recording)
     findings.gate(checks.of_signals(passes, rig, plan))
     facts: dict[str, Estimate] = {}
@@ -168,6 +171,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(results: Sequence[Result], recording: Recording[Plan]) -> Iterable[Figure]:
     """The map of each loop."""
+    from procedures.cogging_map import figures as drawn
+
     return drawn.all_figures(results, recording.rig)
 
 

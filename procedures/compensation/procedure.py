@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from bench.errors import AnalysisError
 from bench.figures import Shown
@@ -22,8 +23,7 @@ from bench.uncertainty import Estimate
 from bench.units import RPM
 from procedures.amb_rotor import lift, pushes
 from procedures.amb_rotor.conventions import conventions
-from procedures.compensation import checks, switching
-from procedures.compensation import figures as drawn
+from procedures.compensation import switching
 from procedures.compensation.hum import of_switch
 from procedures.compensation.plan import Plan
 from procedures.compensation.requires import requires
@@ -35,6 +35,9 @@ from procedures.synchronous.hum import listen
 from procedures.unbalance import figures as unbalance_figures
 from procedures.unbalance import procedure as unbalance
 from procedures.unbalance import sequence
+
+if TYPE_CHECKING:
+    from procedures.compensation import checks
 
 REDUCTION = Quantity(
     "reduction",
@@ -102,6 +105,8 @@ class Compared:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Compared:
     """The dwells as in `unbalance`, the reductions, and the switch where it was captured."""
+    from procedures.compensation import checks
+
     results = unbalance.evaluate(recording, findings)
     reductions = checks.reductions(results)
     findings.add(checks.describe(results, reductions, recording.plan.judged_to_rad_s))
@@ -148,6 +153,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(found: Compared, recording: Recording[Plan]) -> Iterable[Shown]:
     """Those of `unbalance`, the reduction over the speed, and the switch."""
+    from procedures.compensation import figures as drawn
+
     yield from drawn.draw_reductions(found.reductions)
     if found.captured is not None:
         yield from drawn.draw_switch(found.captured)

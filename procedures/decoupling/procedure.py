@@ -22,8 +22,7 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
 from bench.rigfile.stage import StageAxis, axes_of
-from procedures.decoupling import checks, estimates
-from procedures.decoupling import figures as drawn
+from procedures.decoupling import estimates
 from procedures.decoupling.estimates import Result, coupling_of, excursion_of, named, ratio_of
 from procedures.decoupling.plan import Plan
 from procedures.decoupling.requires import requires
@@ -149,6 +148,8 @@ def _rest(rig: Rig, plan: Plan) -> None:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> list[Result]:
     """Each pair."""
+    from procedures.decoupling import checks
+
     rig, plan, runs = recording.rig, recording.plan, read_runs(recording)
     period_s = recording.streams["telemetry"].period_ns * 1e-9
     findings.gate(checks.of_signals(runs, rig, plan, period_s))
@@ -213,6 +214,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(results: Sequence[Result], recording: Recording[Plan]) -> Iterable[Figure]:
     """Traces, then cross forces."""
+    from procedures.decoupling import figures as drawn
+
     return drawn.all_figures(results, recording.plan)
 
 

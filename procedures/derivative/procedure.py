@@ -7,6 +7,7 @@ sidebands, the sidebands alone; for the whole: edges of the band, the derivative
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
 
 from bench.errors import Lacking
 from bench.figures import Figure
@@ -18,14 +19,15 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.capture import Layout
-from procedures.derivative import checks, estimates, fit
-from procedures.derivative import figures as drawn
-from procedures.derivative.estimates import Result
+from procedures.derivative import checks
 from procedures.derivative.plan import Plan
 from procedures.derivative.requires import requires
 from procedures.derivative.steps import LINE, OFFSET, QUIET, asked, read_taken
 from procedures.one_axis.conventions import conventions
 from procedures.shared import assumptions
+
+if TYPE_CHECKING:
+    from procedures.derivative.estimates import Result
 
 GAIN = Quantity("gain", "1", "mean gain of the velocity over the position's derivative")
 PHASE = Quantity("phase", "rad", "mean phase of the velocity before the position's derivative")
@@ -95,6 +97,8 @@ def _take(
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     """The estimator's response at each line, and what it is beside that of the weights."""
+    from procedures.derivative import estimates, fit
+
     plan, taken = recording.plan, read_taken(recording)
     known_hz = conventions(recording.rig).known(recording.rig, "harmonic_hz")
     quiet = next((t for t in taken if t.kind == QUIET and len(t.y)), None)
@@ -115,6 +119,8 @@ def measured(result: Result) -> Iterator[Measured]:
 
 def figures(result: Result, recording: Recording[Plan]) -> Iterable[Figure]:
     """Error over frequency beside that of the weights, gain and phase, sidebands."""
+    from procedures.derivative import figures as drawn
+
     return drawn.all_figures(result, recording.plan)
 
 

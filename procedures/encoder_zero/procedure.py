@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import count
+from typing import TYPE_CHECKING
 
 from bench.errors import BenchError, Lacking
 from bench.figures import Figure
@@ -22,15 +23,16 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
-from procedures.encoder_zero import checks, estimates, groups
-from procedures.encoder_zero import figures as drawn
-from procedures.encoder_zero.estimates import Result
+from procedures.encoder_zero import groups
 from procedures.encoder_zero.groups import PLACES, TRIAL_REPEATS, Group, Setting, parameter_of, settings_of
 from procedures.encoder_zero.plan import Plan
 from procedures.encoder_zero.requires import requires
 from procedures.encoder_zero.steps import STEP, Taken, read_taken
 from procedures.shared import assumptions, planned
 from procedures.shared.rates import of_rate
+
+if TYPE_CHECKING:
+    from procedures.encoder_zero.estimates import Result
 
 ZERO = Quantity("zero", "rad", "electrical angle of the encoder at which the motor's field lies along its first phase")
 RATIO = Quantity("K_ratio", "1", "force or torque per ampere of the one motor over that of the other")
@@ -124,6 +126,8 @@ class Results:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     """Zeros and ratios."""
+    from procedures.encoder_zero import checks, estimates
+
     taken, rig, plan = read_taken(recording), recording.rig, recording.plan
     told = tuple(checks.of_signals(taken, rig, plan))
     findings.gate(told)
@@ -162,6 +166,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(results: Results, recording: Recording[Plan]) -> Iterable[Figure]:
     """The current across over that along, of each motor."""
+    from procedures.encoder_zero import figures as drawn
+
     del recording
     return drawn.all_figures(results.groups, results.taken)
 

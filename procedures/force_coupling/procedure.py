@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,10 +24,6 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
-from procedures.force_coupling import checks as force_coupling_checks
-from procedures.force_coupling import estimates
-from procedures.force_coupling import figures as drawn
-from procedures.force_coupling.estimates import Analysis
 from procedures.force_coupling.plan import Plan
 from procedures.force_coupling.requires import requires
 from procedures.force_coupling.steps import Phase
@@ -36,6 +33,9 @@ from procedures.servomotor.parameters import stated, write
 from procedures.servomotor.steps import POSITIONS, read_steps
 from procedures.shared import assumptions, first_look
 from procedures.shared.step_table import StepTable, record_step
+
+if TYPE_CHECKING:
+    from procedures.force_coupling.estimates import Analysis
 
 RATIO = Quantity(
     "alpha_ratio", "1", "alpha_d/alpha_c, direct over coupled force constant at the home angle", title="α_d/α_c"
@@ -92,6 +92,9 @@ def _visit(rig: Rig, plan: Plan, record: Recorder) -> None:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     """The currents over the phase angle with their fit."""
+    from procedures.force_coupling import checks as force_coupling_checks
+    from procedures.force_coupling import estimates
+
     data = read(recording)
     first_look.gate(recording, findings, checks.segments(data.mean, conventions(recording.rig)))
     findings.gate(_of_signals(data, conventions(recording.rig), recording.plan), FATAL)
@@ -161,6 +164,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(a: Analysis, recording: Recording[Plan]) -> Iterable[Figure]:
     """Currents over gamma with the model, and residuals."""
+    from procedures.force_coupling import figures as drawn
+
     return drawn.all_figures(a.data, a, recording.rig.machine["pole_pairs"].value)
 
 

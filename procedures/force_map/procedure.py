@@ -24,7 +24,6 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from procedures.force_map import estimates, steps
-from procedures.force_map import figures as force_map_figures
 from procedures.force_map.estimates import CROSS, Result
 from procedures.force_map.fit import ABOUT, UNITS
 from procedures.force_map.plan import Plan
@@ -191,6 +190,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(found: tuple[MapData, Result], recording: Recording[Plan]) -> Iterable[Figure]:
     """The greatest terms, residuals and selection."""
+    from procedures.force_map import figures as force_map_figures
+
     del recording
     return force_map_figures.rig_figures(*found)
 

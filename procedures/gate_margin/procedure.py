@@ -18,8 +18,7 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
-from procedures.gate_margin import checks, estimates
-from procedures.gate_margin import figures as drawn
+from procedures.gate_margin import estimates
 from procedures.gate_margin.estimates import Results, weight_of
 from procedures.gate_margin.place import (
     GATE,
@@ -170,6 +169,8 @@ def _look(rig: Rig, plan: Plan, record: Recorder, number: int, place: Place, gat
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     """The margins."""
+    from procedures.gate_margin import checks
+
     rig, plan, gate = recording.rig, recording.plan, bound_of(recording)
     findings.add(checks.of_trials(read_trials(recording), gate[0], rig, plan))
     taken = read_taken(recording)
@@ -215,6 +216,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(found: Results, recording: Recording[Plan]) -> Iterable[Figure]:
     """Largest readings with the gate, their distribution, the catch."""
+    from procedures.gate_margin import figures as drawn
+
     return drawn.all_figures(found, recording.rig)
 
 

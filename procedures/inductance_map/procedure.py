@@ -9,6 +9,7 @@ readings; what turns once with the angle.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING
 
 from bench.errors import AnalysisError
 from bench.figures import Shown
@@ -22,9 +23,7 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.capture import rises
 from bench.rigfile.envelope import Envelope
-from procedures.inductance_map import checks, estimates
-from procedures.inductance_map import figures as drawn
-from procedures.inductance_map.estimates import Result
+from procedures.inductance_map import checks
 from procedures.inductance_map.places import Place, grid
 from procedures.inductance_map.plan import Plan
 from procedures.inductance_map.requires import requires
@@ -32,6 +31,9 @@ from procedures.inductance_map.steps import PLACE, captured, read_taken
 from procedures.shared.rates import of_rate
 from procedures.stages import assumptions
 from procedures.stages.stators import Phase, axis, phases
+
+if TYPE_CHECKING:
+    from procedures.inductance_map.estimates import Result
 
 USUAL_HZ = 20e3
 BEFORE_S = 2e-3
@@ -103,6 +105,8 @@ def _pulse(rig: Rig, plan: Plan, place: Place, phase: Phase) -> None:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     """Fluxes of the pulses, and the map that fits them."""
+    from procedures.inductance_map import estimates
+
     rig, plan, taken = recording.rig, recording.plan, read_taken(recording)
     findings.gate(checks.of_signals(taken, rig, plan))
     findings.gate(checks.of_order(taken, rig))
@@ -147,6 +151,8 @@ def _bytes(rig: RigFile, plan: Plan, phase: Phase) -> int:
 
 def figures(result: Result, recording: Recording[Plan]) -> Iterable[Shown]:
     """Inductance, flux, and the controller's parameters."""
+    from procedures.inductance_map import figures as drawn
+
     return drawn.all_figures(result, recording.rig)
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING
 
 from bench.calibration import Need
 from bench.errors import AnalysisError, Lacking
@@ -21,9 +22,6 @@ from bench.procedure.states import transition
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from procedures.lift_off import checks, estimates
-from procedures.lift_off import figures as drawn
-from procedures.lift_off.estimates import Analysis
 from procedures.lift_off.plan import Plan
 from procedures.lift_off.requires import requires
 from procedures.lift_off.steps import Dwell, Held, Ramp, Rest, always, read_table
@@ -32,6 +30,9 @@ from procedures.servomotor.parameters import named, parameter, stated, write
 from procedures.shared import assumptions
 from procedures.shared.first_look import watched
 from procedures.shared.step_table import record_step
+
+if TYPE_CHECKING:
+    from procedures.lift_off.estimates import Analysis
 
 GAMMA_LIFT = Quantity(
     "gamma_lift",
@@ -148,6 +149,8 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     Raises:
         AnalysisError: there is no step at rest.
     """
+    from procedures.lift_off import checks, estimates
+
     rig, plan, machine = recording.rig, recording.plan, conventions(recording.rig)
     rest = read_table(recording, Rest)
     if rest is None:
@@ -186,6 +189,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(a: Analysis, recording: Recording[Plan]) -> Iterable[Figure]:
     """Position and contact over gamma, currents over gamma."""
+    from procedures.lift_off import figures as drawn
+
     return drawn.all_figures(a)
 
 

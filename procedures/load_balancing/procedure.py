@@ -21,8 +21,7 @@ from bench.procedure.states import transition
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from procedures.load_balancing import checks, estimates, inputs
-from procedures.load_balancing import figures as drawn
+from procedures.load_balancing import estimates, inputs
 from procedures.load_balancing.estimates import FACTS_SEEN, LOADS_SEEN, Result
 from procedures.load_balancing.plan import Plan
 from procedures.load_balancing.requires import requires
@@ -133,6 +132,8 @@ class Analysis:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     """Currents by the phase of the circle, and what was predicted of them."""
+    from procedures.load_balancing import checks
+
     findings.gate([*of_probe(recording), *segments.of_nudges(recording)])
     plan, rig = recording.plan, recording.rig
     around = read_around(recording)
@@ -196,6 +197,8 @@ def _phase(rig: RigFile, plan: Plan) -> Iterator[str]:
 
 def figures(a: Analysis, recording: Recording[Plan]) -> Iterable[Figure]:
     """Loads as vectors, currents, phase angle and path around the circle."""
+    from procedures.load_balancing import figures as drawn
+
     return drawn.all_figures(a.by_way, recording.plan)
 
 

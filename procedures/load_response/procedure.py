@@ -21,8 +21,7 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
-from procedures.load_response import checks, estimates
-from procedures.load_response import figures as drawn
+from procedures.load_response import estimates
 from procedures.load_response.estimates import BAND, COMPLIANCE, FRICTION, LEFT, PEAK, SCALE, Result
 from procedures.load_response.moves import approaches, disturbances, integrators
 from procedures.load_response.plan import Plan
@@ -85,6 +84,8 @@ class Evaluated:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Evaluated:
     """Everything."""
+    from procedures.load_response import checks
+
     rig, plan = recording.rig, recording.plan
     try:
         rests, found = read_rests(recording), read_changes(recording)
@@ -124,6 +125,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(found: Evaluated, recording: Recording[Plan]) -> Iterable[Shown]:
     """Deviation over load, deviation over time."""
+    from procedures.load_response import figures as drawn
+
     del recording
     return drawn.all_figures(found.result, found.changes, found.plan)
 

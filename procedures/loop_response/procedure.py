@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import count
+from typing import TYPE_CHECKING
 
 from bench.errors import AnalysisError
 from bench.figures import Figure
@@ -20,9 +21,7 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
-from procedures.loop_response import checks, estimates, grid
-from procedures.loop_response import figures as drawn
-from procedures.loop_response.estimates import Result
+from procedures.loop_response import grid
 from procedures.loop_response.fit import TOP_DEGREE
 from procedures.loop_response.injection import (
     BELOW,
@@ -42,6 +41,9 @@ from procedures.loop_response.requires import requires
 from procedures.loop_response.steps import REFINED, STEP, SURVEY, line_of, read_taken
 from procedures.shared import assumptions, planned
 from procedures.shared.rates import of_rate
+
+if TYPE_CHECKING:
+    from procedures.loop_response.estimates import Result
 
 BANDWIDTH = Quantity(
     "bandwidth", "Hz", "where |y/r| of a loop falls to -3 dB, reference and rate injected, all others closed"
@@ -154,6 +156,8 @@ def _sensor(look: _Look) -> None:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> list[Result]:
     """Bandwidth and sensitivity of each loop."""
+    from procedures.loop_response import checks, estimates
+
     taken = read_taken(recording)
     findings.gate(checks.of_signals(taken, recording.rig, recording.plan))
     results, failed = estimates.results(taken, recording.rig, recording.plan)
@@ -199,6 +203,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(results: Sequence[Result], recording: Recording[Plan]) -> Iterable[Figure]:
     """|y/r| of all loops with their -3 dB, and |S| over its zones."""
+    from procedures.loop_response import figures as drawn
+
     del recording
     return drawn.all_figures(results)
 

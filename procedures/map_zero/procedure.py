@@ -7,6 +7,7 @@ what both sides differ by at the greatest current.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from bench.figures import Figure
 from bench.findings import Findings
@@ -18,15 +19,15 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
-from procedures.map_zero import checks, estimates
-from procedures.map_zero import figures as drawn
 from procedures.map_zero.approaches import Approach, approaches, ramp
-from procedures.map_zero.estimates import Stator
 from procedures.map_zero.plan import Plan
 from procedures.map_zero.requires import requires
 from procedures.map_zero.steps import LEVEL, read_rests
 from procedures.stages import assumptions
 from procedures.stages.stators import axis
+
+if TYPE_CHECKING:
+    from procedures.map_zero.estimates import Stator
 
 ZERO = Quantity(
     "zero", "rad", "what the encoder reads where the first phase of a stator is aligned, mean over the turn"
@@ -85,6 +86,8 @@ def _drawn(rig: Rig, plan: Plan, record: Recorder, approach: Approach) -> None:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> list[Stator]:
     """Where phases draw the shaft, and the zeros of stators by it."""
+    from procedures.map_zero import checks, estimates
+
     rig, plan, rests = recording.rig, recording.plan, read_rests(recording)
     findings.gate(checks.of_signals(rests, rig, plan))
     findings.gate(checks.of_order(rests, rig, plan))
@@ -116,6 +119,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(found: Sequence[Stator], recording: Recording[Plan]) -> Iterable[Figure]:
     """Alignments and levels."""
+    from procedures.map_zero import figures as drawn
+
     del recording
     return drawn.all_figures(found)
 

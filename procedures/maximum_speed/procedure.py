@@ -8,6 +8,7 @@ taken in the same state of the AMBs, make of the torque currents that were recor
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING
 
 from bench.calibration import Calibration, Need
 from bench.figures import Figure
@@ -18,9 +19,7 @@ from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from procedures.maximum_speed import checks, estimates, foresight
-from procedures.maximum_speed import figures as drawn
-from procedures.maximum_speed.estimates import Result
+from procedures.maximum_speed import foresight
 from procedures.maximum_speed.plan import OP, SHARINGS, Plan
 from procedures.maximum_speed.requires import requires
 from procedures.maximum_speed.running import carry_so_much, guard_of, limit_of, run_all
@@ -30,6 +29,9 @@ from procedures.servomotor.conventions import conventions
 from procedures.servomotor.direction import of_probe
 from procedures.servomotor.parameters import BIASES, chosen, named, stated, write
 from procedures.shared import assumptions
+
+if TYPE_CHECKING:
+    from procedures.maximum_speed.estimates import Result
 
 SPEED_HALF = Quantity(
     "speed_half",
@@ -110,6 +112,8 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     """Speeds, ratio, and what is expected of them."""
+    from procedures.maximum_speed import checks, estimates
+
     findings.gate([*of_probe(recording), *segments.of_nudges(recording), *checks.of_events(recording)])
     plan, rig = recording.plan, recording.rig
     limit, machine = limit_of(rig, plan), conventions(rig)
@@ -156,6 +160,8 @@ def foresees(rig: RigFile, plan: Plan, facts: Mapping[str, Calibration]) -> Iter
 
 def figures(result: Result, recording: Recording[Plan]) -> Iterable[Figure]:
     """Speed over time, torque over speed, currents and bound within a turn."""
+    from procedures.maximum_speed import figures as drawn
+
     return drawn.all_figures(result, recording, limit_of(recording.rig, recording.plan))
 
 

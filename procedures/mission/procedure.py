@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 from bench.errors import DeviceFault, InterlockError
 from bench.figures import Figure
@@ -21,13 +22,13 @@ from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from procedures.mission import checks, estimates
-from procedures.mission import figures as drawn
-from procedures.mission.estimates import Told
 from procedures.mission.plan import Plan
 from procedures.mission.requires import motion, radial, requires
 from procedures.mission.steps import LIFT, MOVE, TURN, Flight, captured, read
 from procedures.shared import assumptions, planned
+
+if TYPE_CHECKING:
+    from procedures.mission.estimates import Told
 
 PEAK = Quantity("peak_reading", "m", "largest distance from the probe's zero during the moves, without noise")
 SWING = Quantity("swing", "m", "peak to peak during a repeat, there and back, without noise")
@@ -138,6 +139,8 @@ class Results:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     """Whether it flew, and the numbers."""
+    from procedures.mission import checks, estimates
+
     flight, rig, plan = read(recording), recording.rig, recording.plan
     findings.gate(checks.of_flight(flight, rig, plan))
     told = estimates.of_flight(flight, rig, plan)
@@ -185,6 +188,8 @@ def _memory(rig: RigFile, plan: Plan) -> Iterator[str]:
 
 def figures(results: Results, recording: Recording[Plan]) -> Iterable[Figure]:
     """Readings with the gate, place and angle, the bearings' currents."""
+    from procedures.mission import figures as drawn
+
     return drawn.all_figures(results.flight, results.told, recording.rig, results.plan)
 
 

@@ -8,6 +8,7 @@ way: the AMBs hold, the motor has no current, and the AMB's own stiffness is tol
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -22,10 +23,6 @@ from bench.procedure.states import transition
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from procedures.negative_stiffness import checks as negative_stiffness_checks
-from procedures.negative_stiffness import estimates
-from procedures.negative_stiffness import figures as drawn
-from procedures.negative_stiffness.estimates import Analysis
 from procedures.negative_stiffness.plan import Plan
 from procedures.negative_stiffness.requires import requires
 from procedures.negative_stiffness.steps import Displaced, HeldByAmbs, HeldByMotor
@@ -35,6 +32,9 @@ from procedures.servomotor.parameters import BIASES, named, needed, stated, writ
 from procedures.servomotor.steps import POSITIONS, read_steps
 from procedures.shared import first_look
 from procedures.shared.step_table import StepTable, record_step
+
+if TYPE_CHECKING:
+    from procedures.negative_stiffness.estimates import Analysis
 
 Array = npt.NDArray[np.float64]
 ALPHA_X = Quantity(
@@ -132,6 +132,9 @@ def _tilt(rig: RigFile) -> float:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     """The stiffness both ways, by the motor's current and by the AMB's."""
+    from procedures.negative_stiffness import checks as negative_stiffness_checks
+    from procedures.negative_stiffness import estimates
+
     first_look.gate(recording, findings, _of_first(recording))
     motor, ambs = read(recording)
     findings.gate(_of_signals(recording, motor, ambs), checks.FATAL)
@@ -227,6 +230,8 @@ def _ranges(rig: RigFile, plan: Plan, furthest: float) -> Iterator[str]:
 
 def figures(a: Analysis, recording: Recording[Plan]) -> Iterable[Figure]:
     """Force over displacement with residuals, and the AMB's lines at both biases."""
+    from procedures.negative_stiffness import figures as drawn
+
     return drawn.all_figures(a, conventions(recording.rig), recording.plan)
 
 

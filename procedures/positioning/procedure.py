@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import count
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,9 +23,6 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
 from bench.rigfile.stage import axes_of
-from procedures.positioning import checks, estimates
-from procedures.positioning import figures as drawn
-from procedures.positioning.estimates import Result
 from procedures.positioning.plan import Plan
 from procedures.positioning.requires import COUNTER, readable, requires
 from procedures.positioning.standard import FIGURES
@@ -32,6 +30,9 @@ from procedures.positioning.steps import READ, READING, REST, read_taken
 from procedures.positioning.targets import UP, Approach, cycle, fewest
 from procedures.positioning.way import Tested, rates, tested
 from procedures.stages import assumptions
+
+if TYPE_CHECKING:
+    from procedures.positioning.estimates import Result
 
 WORDS = {
     "A": ("bidirectional accuracy", "from the lowest mean - 2 s to the highest mean + 2 s, both ways"),
@@ -97,6 +98,8 @@ def _read(rig: Rig, plan: Plan, record: Recorder, one: Tested, approach: Approac
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> list[Result]:
     """The figures of each axis."""
+    from procedures.positioning import checks, estimates
+
     taken = read_taken(recording)
     findings.gate(checks.of_signals(taken, recording.rig, recording.plan))
     findings.add(checks.of_axes(taken, recording))
@@ -156,6 +159,8 @@ def steps_on(rig: RigFile, plan: Plan) -> int:
 
 def figures(results: Sequence[Result], recording: Recording[Plan]) -> Iterable[Shown]:
     """The standard's diagram first."""
+    from procedures.positioning import figures as drawn
+
     return drawn.all_figures(results, recording.rig)
 
 

@@ -21,8 +21,7 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
-from procedures.pull_ratio import checks, estimates
-from procedures.pull_ratio import figures as drawn
+from procedures.pull_ratio import estimates
 from procedures.pull_ratio.estimates import Result
 from procedures.pull_ratio.plan import Plan
 from procedures.pull_ratio.planes import (
@@ -130,6 +129,8 @@ class Evaluated:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Evaluated:
     """Ratios and centres."""
+    from procedures.pull_ratio import checks
+
     rig, plan = recording.rig, recording.plan
     taken = read_taken(recording)
     findings.gate(checks.of_signals(taken, rig, plan))
@@ -182,6 +183,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(found: Evaluated, recording: Recording[Plan]) -> Iterable[Figure]:
     """Current over place, of each axis."""
+    from procedures.pull_ratio import figures as drawn
+
     return drawn.all_figures(found.result, found.taken, recording.rig)
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
+from typing import TYPE_CHECKING
 
 from bench.errors import BenchError
 from bench.figures import Figure
@@ -20,13 +21,13 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
-from procedures.runout_map import checks, estimates
-from procedures.runout_map import figures as drawn
-from procedures.runout_map.estimates import Results
 from procedures.runout_map.plan import Plan
 from procedures.runout_map.requires import requires
 from procedures.runout_map.steps import TURN, read_turns
 from procedures.shared import assumptions, planned
+
+if TYPE_CHECKING:
+    from procedures.runout_map.estimates import Results
 
 RUNOUT = Quantity("runout", "m", "runout of the probes' target less that of the magnets, of one plane and part")
 CURRENT = Quantity("runout_current", "A", "bearing current that turns with the shaft, of one plane and part",
@@ -97,6 +98,8 @@ def _slow(rig: Rig, plan: Plan) -> Iterator[None]:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     """Vectors of each plane."""
+    from procedures.runout_map import checks, estimates
+
     rig, plan, turned = recording.rig, recording.plan, read_turns(recording)
     findings.gate(checks.of_signals(turned, rig, plan))
     results = estimates.results(turned, rig, plan)
@@ -132,6 +135,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(results: Results, recording: Recording[Plan]) -> Iterable[Figure]:
     """The vectors."""
+    from procedures.runout_map import figures as drawn
+
     del recording
     return drawn.all_figures(results)
 

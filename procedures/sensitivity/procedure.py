@@ -25,8 +25,7 @@ from bench.rigfile.capture import Layout
 from procedures.amb_rotor import lift, pushes, wiring
 from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.laws import of_laws
-from procedures.sensitivity import checks, estimates, fitting, modes, sines
-from procedures.sensitivity import figures as drawn
+from procedures.sensitivity import estimates, fitting, modes, sines
 from procedures.sensitivity.estimates import Candidate, Result
 from procedures.sensitivity.fitting import chosen_axes
 from procedures.sensitivity.injection import Comb, combs, inject, repeated
@@ -197,6 +196,8 @@ def _take(
 
 def evaluate(recording: Recording[Any], findings: Findings) -> list[Result]:
     """S, its peak and the margins, of each axis and speed."""
+    from procedures.sensitivity import checks
+
     first_look.gate(recording, findings, wiring.before_orbits(recording))
     findings.gate([*wiring.before_orbits(recording), *checks.before(recording)])
     plan, taken = recording.plan, sines.joined(read_taken(recording))
@@ -224,6 +225,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(results: Sequence[Result], recording: Recording[Plan]) -> Iterable[Figure]:
     """|S| over its zones, Bode pair of S, Nyquist plot and coherence, by speed."""
+    from procedures.sensitivity import figures as drawn
+
     del recording
     return drawn.all_figures(results)
 

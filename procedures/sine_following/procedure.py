@@ -17,8 +17,7 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.stage import StageAxis
-from procedures.sine_following import checks, estimates
-from procedures.sine_following import figures as drawn
+from procedures.sine_following import estimates
 from procedures.sine_following.estimates import LAG, LARGEST, RATIO, RMS, TRUE, Results
 from procedures.sine_following.plan import Plan
 from procedures.sine_following.requires import requires
@@ -86,6 +85,8 @@ def waves(axes: Iterable[StageAxis], mode: Mode, plan: Plan) -> dict[str, float]
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     """Whether set points were sines, and what the axes did."""
+    from procedures.sine_following import checks
+
     rig, plan, rides = recording.rig, recording.plan, read(recording)
     findings.gate(checks.of_rides(rides, rig, plan))
     groups = estimates.grouped(rides, plan)
@@ -115,6 +116,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(found: Results, recording: Recording[Plan]) -> Iterable[Figure]:
     """Set point and reading over a period, and the error."""
+    from procedures.sine_following import figures as drawn
+
     return drawn.all_figures(found, recording.plan)
 
 

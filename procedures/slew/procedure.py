@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
 
 from bench.calibration import Need
 from bench.figures import Figure
@@ -21,13 +22,14 @@ from bench.rigfile import RigFile
 from procedures.servomotor import carrying, hold, segments, wiring
 from procedures.servomotor.parameters import named, stated, write
 from procedures.shared import assumptions
-from procedures.slew import estimates, fit, steps
-from procedures.slew import figures as drawn
-from procedures.slew.estimates import Result
+from procedures.slew import fit, steps
 from procedures.slew.fit import Gains
 from procedures.slew.plan import Plan
 from procedures.slew.requires import requires
 from procedures.slew.steps import STARTED, STEP, read_swings
+
+if TYPE_CHECKING:
+    from procedures.slew.estimates import Result
 
 RMS = Quantity("error_rms", "rad", "root mean square of the tracking error, free of the encoder's counts")
 PEAK = Quantity("error_peak", "rad", "greatest tracking error")
@@ -87,6 +89,8 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     """The swings by frequency, and what the slowest says of the torque."""
+    from procedures.slew import estimates
+
     findings.gate(segments.before_carrying(recording))
     findings.gate(steps.of_signals(recording), ("stuck-channel",))
     result = estimates.evaluate(recording, read_swings(recording), gains(recording.plan))
@@ -130,6 +134,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(result: Result, recording: Recording[Plan]) -> Iterable[Figure]:
     """Angle and error over time and over angle, growth with frequency, torque current over angle, its orders."""
+    from procedures.slew import figures as drawn
+
     return drawn.all_figures(result, recording.plan.detent_order)
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from bench.figures import Figure
 from bench.findings import Finding, Findings
@@ -23,14 +24,15 @@ from procedures.servomotor import carrying, hold, segments, wiring
 from procedures.servomotor.conventions import conventions
 from procedures.servomotor.parameters import BIASES, chosen, named, write
 from procedures.shared import assumptions
-from procedures.spindown import checks, coasting, estimates, waves
-from procedures.spindown import figures as drawn
+from procedures.spindown import coasting, waves
 from procedures.spindown.coasting import Coasted
-from procedures.spindown.estimates import Drag
 from procedures.spindown.plan import Plan
 from procedures.spindown.requires import by_drive, requires
 from procedures.spindown.running_down import SLOW, run_down
 from procedures.spindown.steps import RunDown, read_run_downs
+
+if TYPE_CHECKING:
+    from procedures.spindown.estimates import Drag
 
 B = Quantity("B", "N m s/rad", "viscous drag, mean over the directions that it was turned in")
 B_HIGH = Quantity(
@@ -133,6 +135,9 @@ class Analysis:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis | Coasted:
     """The run-downs, evaluated by the angle and by the speed; where the rig has no motor, as `coasting`."""
+    from procedures.spindown import checks, estimates
+    from procedures.spindown import figures as drawn
+
     if by_drive(recording.rig):
         return coasting.evaluate(recording, findings)
     findings.gate([*checks.before_fits(recording), *segments.of_nudges(recording)])
@@ -155,17 +160,20 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis | Coast
 
 def measured(a: Analysis | Coasted) -> Iterator[Measured]:
     """B and T_c by the speed if it could be fitted, and all quantities by the angle, which are the results."""
+
     state = CARRIED if isinstance(a, Analysis) and a.motor_carries else ""
     if isinstance(a, Analysis) and a.speed is not None:
         for quantity in (B, T_C):
             yield quantity.measured(a.speed.estimates[quantity.name], f"{state}, {BY_SPEED}" if state else BY_SPEED)
-    estimates = facts(a)
+    stated = facts(a)
     for quantity in MEASURES:
-        if quantity.name in estimates:
-            yield quantity.measured(estimates[quantity.name], state)
+        if quantity.name in stated:
+            yield quantity.measured(stated[quantity.name], state)
 
 
 def _inertia(result: Drag, rig: RigFile) -> Estimate:
+    from procedures.spindown import estimates
+
     return result.estimates.get("J_z") or estimates.stated_inertia(rig)
 
 
@@ -206,6 +214,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(a: Analysis | Coasted, recording: Recording[Plan]) -> Iterable[Figure]:
     """Speed over time with fit and residuals, deceleration and loss power over speed."""
+    from procedures.spindown import figures as drawn
+
     if isinstance(a, Coasted):
         return coasting.figures(a)
     return drawn.all_figures(a.runs, a.angle, recording.plan.speed_rad_s)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import count
+from typing import TYPE_CHECKING
 
 from bench.calibration import Need
 from bench.errors import AnalysisError
@@ -26,14 +27,15 @@ from bench.rigfile.envelope import Envelope
 from procedures.shared import continued
 from procedures.stages import assumptions
 from procedures.stages.stators import axis, phases
-from procedures.static_characteristics import checks, estimates, halves
-from procedures.static_characteristics import figures as drawn
+from procedures.static_characteristics import checks, halves
 from procedures.static_characteristics.beside import Beside, by_flux, of_controller
-from procedures.static_characteristics.estimates import Result
 from procedures.static_characteristics.places import SIDES, Load, grid, loads, repeated
 from procedures.static_characteristics.plan import Plan
 from procedures.static_characteristics.requires import Cell, cells, requires
 from procedures.static_characteristics.steps import READ, READING, read_taken
+
+if TYPE_CHECKING:
+    from procedures.static_characteristics.estimates import Result
 
 PART = "cells"
 MAP = "inductance-map"
@@ -138,6 +140,8 @@ def _read(
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     """Loads, and the map that fits them."""
+    from procedures.static_characteristics import estimates
+
     rig, plan, taken = recording.rig, recording.plan, read_taken(recording)
     findings.gate(checks.of_signals(taken, rig, plan))
     findings.gate(checks.of_order(taken, rig))
@@ -187,6 +191,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(result: Result, recording: Recording[Plan]) -> Iterable[Shown]:
     """Torque and force."""
+    from procedures.static_characteristics import figures as drawn
+
     del recording
     return drawn.all_figures(result)
 

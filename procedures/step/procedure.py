@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from bench.errors import NotReached
 from bench.figures import Figure
@@ -23,14 +24,15 @@ from bench.units import RPM
 from procedures.amb_rotor import frame, lift
 from procedures.amb_rotor.conventions import conventions
 from procedures.shared import assumptions
-from procedures.step import capturing, checks, estimates, hum, planes, slewing
-from procedures.step import figures as drawn
-from procedures.step.estimates import Result
+from procedures.step import capturing, hum, planes, slewing
 from procedures.step.plan import Plan
 from procedures.step.position import leans
 from procedures.step.record_length import enough_s, faded_s
 from procedures.step.requires import requires
 from procedures.step.steps import STEP, TURNING_RAD_S, Case, Done, cases, read_steps
+
+if TYPE_CHECKING:
+    from procedures.step.estimates import Result
 
 OVERSHOOT = Quantity("overshoot", "1", "greatest position beyond the step, as a share of it")
 RISE = Quantity("rise_time", "s", "10 to 90 % of the step")
@@ -172,6 +174,8 @@ class Results:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     """The response of each case, and what the cases of an axis have in common."""
+    from procedures.step import checks, estimates
+
     before = list(checks.before(recording))
     findings.gate(before)
     exchanged = [] if before else list(planes.find_exchanged(recording))
@@ -239,6 +243,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 def figures(results: Results, recording: Recording[Plan]) -> Iterable[Figure]:
     """Responses with band and model, control currents, overshoot over the size; the steps as they came where the evaluation
     ended with them."""
+    from procedures.step import figures as drawn
+
     del recording
     return drawn.all_figures(results.steps, results.by_case) if results.by_case else drawn.raw_figures(results.steps)
 

@@ -19,8 +19,7 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from procedures.stages import assumptions, tracks
 from procedures.stages.tracks import Mode, chosen, sisters, waits_at
-from procedures.step_following import checks, estimates
-from procedures.step_following import figures as drawn
+from procedures.step_following import estimates
 from procedures.step_following.estimates import ERROR, OVER, TIME, TRUE, Results
 from procedures.step_following.plan import Plan
 from procedures.step_following.requires import requires
@@ -64,6 +63,8 @@ def _step(rig: Rig, plan: Plan, record: Recorder, mode: Mode, repeat: int, way: 
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     """Whether the axes were sent, and what they did."""
+    from procedures.step_following import checks
+
     rig, plan, moves = recording.rig, recording.plan, read(recording)
     findings.gate(checks.of_moves(moves, rig, plan))
     groups = estimates.grouped(moves, plan)
@@ -95,6 +96,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(found: Results, recording: Recording[Plan]) -> Iterable[Figure]:
     """Set point and reading, and the error in detail."""
+    from procedures.step_following import figures as drawn
+
     return drawn.all_figures(found, recording.plan)
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -31,9 +32,7 @@ from procedures.servomotor.parameters import BIASES, CURRENTS, named, stated, wr
 from procedures.shared import assumptions, continued, first_look
 from procedures.shared.continued import Done
 from procedures.shared.step_table import of_samples, record_step
-from procedures.torque_constant import checks, fit, halves
-from procedures.torque_constant import figures as drawn
-from procedures.torque_constant.fit import NO_DETENT, Balance, Detent
+from procedures.torque_constant import checks, halves
 from procedures.torque_constant.inputs import arms_u, fit_inputs, masses_u
 from procedures.torque_constant.plan import Plan
 from procedures.torque_constant.requires import requires
@@ -46,6 +45,9 @@ from procedures.torque_constant.steps import (
     read_wiring,
     wiring,
 )
+
+if TYPE_CHECKING:
+    from procedures.torque_constant.fit import Balance, Detent
 
 Array = npt.NDArray[np.float64]
 ALPHA_TAU = Quantity("alpha_tau", "N m/A", "torque per mean true segment current at the home angle, peak over gamma")
@@ -212,6 +214,9 @@ def measured(a: Analysis) -> Iterator[Measured]:
 
 def _fitted(recording: Recording[Plan], data: TorqueData) -> Analysis:
     """Fit and estimates with their influences."""
+    from procedures.torque_constant import fit
+    from procedures.torque_constant.fit import NO_DETENT
+
     plan, rig = recording.plan, recording.rig
     inputs, pairs, count = fit_inputs(rig, plan.masses), rig.machine["pole_pairs"].value, len(plan.masses)
     held = NO_DETENT
@@ -252,6 +257,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(a: Analysis, recording: Recording[Plan]) -> Iterable[Figure]:
     """Torque over current per side, the constant over gamma with residuals, detent, one step."""
+    from procedures.torque_constant import figures as drawn
+
     return drawn.all_figures(recording, a.data, a.balance, a.detent, recording.rig.machine["pole_pairs"].value)
 
 

@@ -28,8 +28,7 @@ from procedures.amb_rotor.geometry import nominal
 from procedures.amb_rotor.laws import of_laws
 from procedures.amb_rotor.machine import Law
 from procedures.shared import first_look
-from procedures.tracking import by_points, checks, estimates
-from procedures.tracking import figures as drawn
+from procedures.tracking import by_points
 from procedures.tracking.plan import Plan
 from procedures.tracking.requires import requires
 from procedures.tracking.steps import GROWN, ORBIT, START, STARTED, Orbit, read_orbits
@@ -161,6 +160,8 @@ class Results:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     """Errors, tilts and distances of each law's orbit."""
+    from procedures.tracking import checks, estimates
+
     first_look.gate(recording, findings, wiring.before_orbits(recording))
     findings.gate(wiring.before_orbits(recording))
     plan, orbits = recording.plan, read_orbits(recording)
@@ -237,6 +238,8 @@ def _points(rig: RigFile, plan: Plan) -> Iterator[str]:
 
 def figures(results: Results, recording: Recording[Plan]) -> Iterable[Figure]:
     """Orbits with the ring, errors over time and over the reference's revolution, tilts, coil currents."""
+    from procedures.tracking import figures as drawn
+
     facts = {o.law: nominal(recording.rig, o.t_0) for o in results.orbits}
     return drawn.all_figures(results.orbits, facts)
 

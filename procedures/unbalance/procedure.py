@@ -27,7 +27,6 @@ from procedures.synchronous.default_speeds import within_envelope
 from procedures.synchronous.dwells import can_capture, read_dwells
 from procedures.synchronous.estimates import Results
 from procedures.synchronous.hum import listen, of_dwells
-from procedures.unbalance import figures as drawn
 from procedures.unbalance import sequence
 from procedures.unbalance.plan import Plan
 from procedures.unbalance.requires import requires
@@ -126,6 +125,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(results: Results, recording: Recording[Plan]) -> Iterable[Shown]:
     """Orbits of both planes, Bode pair, polar plot, full spectra, what the coils need."""
+    from procedures.unbalance import figures as drawn
+
     return drawn.all_figures(results, recording.rig)
 
 
