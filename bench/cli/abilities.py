@@ -8,10 +8,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from bench import catalogue
-from bench.cli.loading import beside, load_procedure, of_entry
+from bench.cli.loading import beside, load_procedure, of_entry, requires_of
 from bench.errors import ConfigError, Lacking, Problem
 from bench.procedure import BenchPlan, Procedure
 from bench.procedure.plans import assemble
+from bench.procedure.requires import lacking
 from bench.record.specs import load_spec
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
@@ -51,11 +52,22 @@ def abilities(rig: RigFile, only: str = "") -> list[Ability]:
 
 def _of_entry(rig: RigFile, entry: catalogue.Entry) -> Ability:
     if entry.point is None:
-        return _ability(rig, of_entry(entry))
+        missing = lacking(requires_of(entry), rig)
+        return (
+            Ability(entry.name, missing) if missing and not _stated(rig, entry.name) else _ability(rig, of_entry(entry))
+        )
     try:
         return _ability(rig, of_entry(entry))
     except ConfigError as error:
         return Ability(entry.name, unfit=(str(error),))
+
+
+def _stated(rig: RigFile, procedure: str) -> bool:
+    """Whether the rig file or its limits say something of a procedure, which is then held against the procedure itself."""
+    try:
+        return procedure in rig.plans or bool(load_spec(rig.name, procedure))
+    except ConfigError:
+        return True
 
 
 def _ability(rig: RigFile, procedure: Procedure) -> Ability:

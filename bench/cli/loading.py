@@ -13,7 +13,7 @@ import importlib
 import os
 import re
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType
@@ -23,6 +23,7 @@ from bench import catalogue, extensions
 from bench.errors import ConfigError
 from bench.procedure import BenchPlan, Origin, Procedure, Quantity
 from bench.procedure.origin import FILE
+from bench.procedure.requires import Requires
 from bench.procedure.roles import RigState
 from bench.rigfile import RigFile
 from bench.rundir import LISTENED
@@ -83,6 +84,14 @@ def of_entry(entry: catalogue.Entry) -> Procedure:
         raise ConfigError(f"{whose}: found the name {loaded.name!r} in it; expected that of its entry point. "
                           f"Next: tell who wrote the package")  # fmt: skip
     return _foreign(loaded, whose, Origin(entry.point.package, entry.point.version))
+
+
+def requires_of(entry: catalogue.Entry) -> Callable[[RigFile], Requires]:
+    """What a procedure of ours needs of a rig: the room's `requires`, without the procedure, which takes longer to import."""
+    found: Callable[[RigFile], Requires] = importlib.import_module(
+        f"{entry.module.rpartition('.')[0]}.requires"
+    ).requires
+    return found
 
 
 def loadable() -> Iterator[Procedure]:

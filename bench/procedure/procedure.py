@@ -14,7 +14,7 @@ from bench.findings import Ended, Finding, Findings
 from bench.plan import BenchPlan
 from bench.procedure.names import by_names_of, quantities_on
 from bench.procedure.origin import Origin
-from bench.procedure.requires import Requires
+from bench.procedure.requires import Requires, lacking
 from bench.procedure.roles import RigState
 from bench.quantity import Measured, Quantity
 from bench.rigfile.aliases import known_as
@@ -204,12 +204,7 @@ class Procedure:
 
     def lacking(self, rig: RigFile) -> tuple[str, ...]:
         """What the rig does not have, one line a table of its file; nothing where it can run the procedure."""
-        try:
-            return self.requires(rig).lacking(rig)
-        except Lacking as error:
-            return error.lines
-        except ConfigError as error:  # a DBC that cannot be read, which `bench check` names by itself
-            return (str(error),)
+        return lacking(self.requires, rig)
 
     def evaluated(self, recording: Recording[Any]) -> Evaluated:
         """What `evaluate` makes of a recording and what it finds in it, made the first time it is asked for."""

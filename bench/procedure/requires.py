@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 
+from bench.errors import ConfigError, Lacking
 from bench.rigfile import RigFile
 from bench.rigfile.capabilities import is_bound as can
 from bench.rigfile.roles import is_bound, resolved
@@ -72,3 +73,13 @@ class Requires:
         if self.masses and not rig.masses:
             yield "masses: found none; expected certified masses to hang"
         yield from self.lacks
+
+
+def lacking(requires: Callable[[RigFile], Requires], rig: RigFile) -> tuple[str, ...]:
+    """What a rig does not have of what a procedure `requires`, one line a table of its file; nothing where it can run it."""
+    try:
+        return requires(rig).lacking(rig)
+    except Lacking as error:
+        return error.lines
+    except ConfigError as error:  # a DBC that cannot be read, which `bench check` names by itself
+        return (str(error),)

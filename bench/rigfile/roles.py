@@ -28,6 +28,8 @@ from bench.samples import TICKS
 Samples = Mapping[str, npt.NDArray[Any]]
 ANGLE, SPEED, PULSES, EDGE = "mark.angle", "mark.speed", "mark.pulses", "mark.edge"
 STATUS = "controller.status"
+STATE = "state"
+"""The key that every controller's state has among the channels: a role of the protocol and no name."""
 AGE = "mark.age"
 """How long before a sample's time the last edge came, s; by `mark.edge` and the device's ticks."""
 FLOAT_BITS = 24  # of a whole number that a float of 32 bits still holds

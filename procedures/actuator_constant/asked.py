@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from bench.procedure.requires import Requires
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
 from procedures.actuator_constant import ring
 from procedures.actuator_constant.plan import Plan
 from procedures.actuator_constant.sines import loops, places, rate, sine, with_the_ring
-from procedures.actuator_constant.steps import STATE
 from procedures.position_loops.injection import BELOW, REFERENCE, ability, parameters_of
-from procedures.position_loops.motors import motors, periods_of
+from procedures.position_loops.motors import motors
 from procedures.shared import planned
 from procedures.shared.rates import of_rate
 
@@ -67,36 +65,3 @@ def _of_ring(rig: RigFile, plan: Plan) -> Iterator[str]:
         yield f"added_inertia: found a ring of {kg:g} kg; expected {rig.envelope.max_hung_kg:g} kg at most (max_hung_kg)"
     if not any("operator" in device.roles for device in rig.devices.values()):
         yield "added_inertia: found true; devices: found none in the role operator, who mounts the ring"
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig has."""
-    can, driving = rig.capabilities.loop_injection, rig.capabilities.force_currents
-    wanted = ("loop_injection", "force_currents", "motion")
-    if can is None or not driving or rig.capabilities.motion is None:
-        return Requires(capabilities=wanted, capture=())
-    shown = tuple(dict.fromkeys(can.loops[one.loop].channel for one in driving.values()))
-    currents = tuple(one.current for one in driving.values())
-    coils = tuple(c for name in driving for c in rig.motors[name].currents)
-    return Requires(
-        channels=(*shown, *currents, STATE),
-        sensors=coils,
-        machine=periods_of(rig, "machine", driving),
-        geometry=periods_of(rig, "geometry", driving),
-        capabilities=wanted,
-        capture=(*shown, *currents, *coils, *([can.wave] if can.wave else [])),
-        lacks=tuple(_lacks(rig)),
-    )
-
-
-def _lacks(rig: RigFile) -> Iterator[str]:
-    can = ability(rig)
-    if REFERENCE not in can.places:
-        yield "capabilities.loop_injection.places: found no reference"
-    for loop in dict.fromkeys(one.loop for one in rig.capabilities.force_currents.values()):
-        if not can.loops[loop].inertia:
-            yield f"capabilities.loop_injection.loops.{loop}: found no inertia"
-        if len(motors(rig, loop)) > 2:
-            yield f"capabilities.force_currents: found {len(motors(rig, loop))} motors along {loop}; expected one or two"
-        if not places(rig, Plan.model_validate({}), loop):
-            yield f"capabilities.motion: {loop} is moved by none of its set points"

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from itertools import count
+from typing import TYPE_CHECKING
 
 from bench.calibration import Need
 from bench.errors import AnalysisError, BenchError
@@ -22,11 +23,10 @@ from bench.procedure.states import transition, within_reach
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from procedures.actuator_constant import checks, estimates, ring
-from procedures.actuator_constant import figures as drawn
-from procedures.actuator_constant.asked import adds, check, requires
-from procedures.actuator_constant.estimates import Result
+from procedures.actuator_constant import ring
+from procedures.actuator_constant.asked import adds, check
 from procedures.actuator_constant.plan import Plan
+from procedures.actuator_constant.requires import requires
 from procedures.actuator_constant.sines import (
     Place,
     frequencies,
@@ -42,6 +42,9 @@ from procedures.actuator_constant.steps import ADDED, SINE, channels, read_added
 from procedures.position_loops.injection import REFERENCE, ability, injected
 from procedures.position_loops.motors import around, motors
 from procedures.shared import assumptions, planned
+
+if TYPE_CHECKING:
+    from procedures.actuator_constant.estimates import Result
 
 K_FORCE = Quantity("K_force", "N/A", "force of a motor along per ampere that gives it", title="force constant")
 K_TORQUE = Quantity("K_torque", "N m/A", "torque of a motor per ampere that gives it", title="torque constant")
@@ -153,6 +156,8 @@ def _added(rig: Rig, plan: Plan, record: Recorder, loop: str, place: Place) -> N
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> list[Result]:
     """Constants of each loop's motors."""
+    from procedures.actuator_constant import checks, estimates
+
     rig, plan = recording.rig, recording.plan
     taken, added = read_taken(recording), read_added(recording)
     findings.gate(checks.of_signals(taken, added, rig, plan))
@@ -178,6 +183,8 @@ def measured(results: Sequence[Result]) -> Iterator[Measured]:
 
 def figures(results: Sequence[Result], recording: Recording[Plan]) -> Iterable[Figure]:
     """The apparent constant of each line with the fit."""
+    from procedures.actuator_constant import figures as drawn
+
     del recording
     return drawn.all_figures(results)
 

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from bench.recording import Recording, Step
 from bench.rigfile import RigFile
+from bench.rigfile.roles import STATE
 from procedures.actuator_constant.plan import Plan
 from procedures.position_loops.injection import ability
 from procedures.position_loops.lines import without_trend
@@ -18,7 +19,6 @@ from procedures.position_loops.motors import motors
 
 Array = npt.NDArray[np.float64]
 SINE, ADDED = "sine", "added"
-STATE = "state"
 
 
 def with_ring(place: str) -> str:

@@ -19,9 +19,9 @@ from procedures.amb_calibration import both_coils, hypotheses
 from procedures.amb_calibration.fit import Fit
 from procedures.amb_calibration.hypotheses import CHANCE, Contradiction, Suspect
 from procedures.amb_calibration.plan import Plan
-from procedures.amb_calibration.pulls import Loaded, Pull
+from procedures.amb_calibration.pulls import Loaded, Pull, axes
 from procedures.amb_calibration.scatter import Scatter
-from procedures.amb_calibration.steps import HangingData, axes
+from procedures.amb_calibration.steps import HangingData
 from procedures.shared import signals
 
 Array = npt.NDArray[np.float64]

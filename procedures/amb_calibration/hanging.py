@@ -12,8 +12,8 @@ from bench.procedure.roles import NOTHING, Load
 from bench.recording.recorder import Recorder
 from procedures.amb_calibration import both_coils, checks, turns
 from procedures.amb_calibration.plan import Plan
-from procedures.amb_calibration.pulls import Pull
-from procedures.amb_calibration.steps import Hang, HangOn, axes, hung
+from procedures.amb_calibration.pulls import Pull, axes
+from procedures.amb_calibration.steps import Hang, HangOn, hung
 from procedures.shared import first_look
 from procedures.shared.continued import Done
 from procedures.shared.step_table import record_step

@@ -9,38 +9,36 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bench.figures import Figure
 from bench.findings import Ended, Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from bench.rigfile.roles import STATUS
 from bench.uncertainty import Estimate, interval, propagate
-from procedures.amb_calibration import both_coils, checks, halves, hypotheses, turns
+from procedures.amb_calibration import both_coils, halves, hypotheses, turns
 from procedures.amb_calibration import by_angle as amb_calibration_by_angle
-from procedures.amb_calibration import figures as drawn
-from procedures.amb_calibration import fit as amb_calibration_fit
-from procedures.amb_calibration.estimates import less_sure, turned_by_hand, turning_point, unresolved_angles
-from procedures.amb_calibration.fit import Fit
 from procedures.amb_calibration.hanging import exercised, hung_up_and_down, sequence
 from procedures.amb_calibration.hypotheses import Contradiction
 from procedures.amb_calibration.inputs import fit_inputs, hand_rad
 from procedures.amb_calibration.plan import FEWEST_MASSES, Plan
 from procedures.amb_calibration.pulls import Loaded, Pull, pulls
+from procedures.amb_calibration.requires import requires
 from procedures.amb_calibration.scatter import Scatter, covariance_by_angle, covariance_over_a_turn, outputs, scatter
-from procedures.amb_calibration.steps import Hang, HangingData, channels, hung, read_hangings
+from procedures.amb_calibration.steps import Hang, HangingData, hung, read_hangings
 from procedures.servomotor.loads import check_masses
 from procedures.shared import assumptions, continued
 from procedures.shared.default_masses import by_weight
 from procedures.shared.weight import weight
+
+if TYPE_CHECKING:
+    from procedures.amb_calibration.fit import Fit
 
 K = Quantity("K", "N/A", "dF/di of a bearing's axis at zero control current, mean over a turn")
 K2 = Quantity("K2", "N/A^2", "(d²F/di²)/2 of a bearing's axis, mean over a turn")
@@ -93,6 +91,8 @@ class Analysis:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> list[Analysis]:
     """Fit, scatter and estimates with their influences, of each hook."""
+    from procedures.amb_calibration import checks
+
     rig, found = recording.rig, pulls(recording.rig)
     findings.gate(checks.of_first(recording, found, {pull.hook: hung(rig, pull.hook) for pull in found}))
     findings.add(turns.findings(recording))
@@ -100,6 +100,8 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> list[Analysis]:
 
 
 def _evaluated(recording: Recording[Plan], findings: Findings, pull: Pull, several: bool) -> Analysis:
+    from procedures.amb_calibration import checks
+
     plan = recording.plan
     data = read_hangings(recording, pull)
     findings.gate(checks.of_signals(data, turns.limits(recording.rig), plan), checks.FATAL)
@@ -156,6 +158,9 @@ def _fact(name: str, of: tuple[Loaded, ...]) -> str:
 
 
 def _fitted(recording: Recording[Plan], data: HangingData) -> Analysis:
+    from procedures.amb_calibration import fit as amb_calibration_fit
+    from procedures.amb_calibration.estimates import less_sure, turned_by_hand, turning_point, unresolved_angles
+
     plan, rig = recording.plan, recording.rig
     inputs = fit_inputs(rig, plan.masses, data.hangings.pull)
     count = len(plan.masses)
@@ -215,25 +220,12 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(parts: list[Analysis], recording: Recording[Plan]) -> Iterable[Figure]:
     """Of each hook: fit, residuals, one step over time, and both polar plots."""
+    from procedures.amb_calibration import figures as drawn
+
     for a in parts:
         values = {name: e.value for name, e in a.inputs.items()}
         for figure in drawn.all_figures(recording, a.data, a.fit, values):
             yield figure if len(parts) == 1 else replace(figure, key=f"{figure.key}-{a.fit.pull.hook}")
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the rig file's tables."""
-    found = pulls(rig)
-    return Requires(
-        lacks=tuple(turns.lacks(rig)),
-        roles=("levitation", "operator"),
-        channels=(*channels(rig), STATUS),
-        sensors=tuple(dict.fromkeys(coil for pull in found for axis in pull.axes for coil in axis.coils)),
-        parameters=turns.parameters(rig),
-        capabilities=("bias",),
-        masses=True,
-        uses=("angle",),
-    )
 
 
 procedure = Procedure(

@@ -189,3 +189,14 @@ def _loaded(rig: RigFile, bearing: Support, plane: int, axis: SupportedAxis, aga
 def _share(c: float) -> float:
     nearest = float(np.round(c))
     return nearest if abs(c - nearest) < 1e-12 else c
+
+
+def channels(rig: RigFile) -> tuple[str, ...]:
+    """What is recorded while masses hang, besides the flags: currents and positions of every axis."""
+    every = axes(pulls(rig)[0])
+    return (*(coil for a in every for coil in a.coils), *(a.position for a in every))
+
+
+def axes(pull: Pull) -> tuple[Loaded, ...]:
+    """All of both bearings: those that the pull loads, then those across it."""
+    return (*pull.axes, *pull.across)

@@ -17,7 +17,7 @@ from bench.rigfile.places import CENTRE, Places
 from bench.rigfile.supports import two_planes
 from procedures.amb_calibration.fit import Hangings, hung_shares
 from procedures.amb_calibration.plan import Plan
-from procedures.amb_calibration.pulls import Loaded, Pull, pulls
+from procedures.amb_calibration.pulls import Loaded, Pull, channels, pulls
 from procedures.servomotor.conventions import displacement
 from procedures.servomotor.loads import load_index
 from procedures.shared.step_table import Labels, StepTable, by_angle, tabulate
@@ -56,17 +56,6 @@ class HangingData:
     table: StepTable[Hang]
     masses: tuple[str, ...]
     hung: tuple[float, float]
-
-
-def channels(rig: RigFile) -> tuple[str, ...]:
-    """What is recorded while masses hang, besides the flags: currents and positions of every axis."""
-    every = axes(pulls(rig)[0])
-    return (*(coil for a in every for coil in a.coils), *(a.position for a in every))
-
-
-def axes(pull: Pull) -> tuple[Loaded, ...]:
-    """All of both bearings: those that the pull loads, then those across it."""
-    return (*pull.axes, *pull.across)
 
 
 def read_hangings(recording: Recording[Plan], pull: Pull | None = None) -> HangingData:

@@ -15,11 +15,11 @@ from bench.recording.recorder import Recorder
 from procedures.amb_rotor import liftable, nudges, pushes, rings
 from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.nudges import PROBE, Nudge
+from procedures.amb_rotor.stations import NUDGES
 from procedures.shared import first_look
 
 REST, LIFT = "rest", "lift"
 LIFT_LOST, NO_SPEED = "lift-lost", "no-speed"
-NUDGES: tuple[tuple[str, float], ...] = (("y", 10e-6), ("theta", 100e-6))  # of the set points, m and rad, at most
 NEAR = 0.11  # of the least clearance, that a nudge moves the shaft by at a bearing, at most
 STEPS = 2 + 2 * len(NUDGES)  # that `lift_and_nudge` records
 

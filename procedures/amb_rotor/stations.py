@@ -31,6 +31,7 @@ from bench.rigfile.toleranced import Toleranced
 Array = npt.NDArray[np.float64]
 SQUARE = 1e-12  # of a cosine: what rounding leaves of nothing
 COORDINATES = ("y", "z", "psi", "theta")
+NUDGES: tuple[tuple[str, float], ...] = (("y", 10e-6), ("theta", 100e-6))  # of the set points, m and rad, at most
 AXIAL = "x"
 ALONG = ""  # where axes are asked for by name: along the shaft, and no axis is called so
 NOTHING = Sum()

@@ -10,26 +10,28 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from procedures.angle_step import bounds, checks, estimates, response
-from procedures.angle_step import figures as drawn
-from procedures.angle_step.estimates import Result
+from procedures.angle_step import bounds, response
 from procedures.angle_step.plan import Plan
+from procedures.angle_step.requires import requires
 from procedures.angle_step.response import Loop
-from procedures.angle_step.steps import STEP, Case, Done, cases, channels, positions, read_moves
+from procedures.angle_step.steps import STEP, Case, Done, cases, read_moves
 from procedures.servomotor import carrying, hold, segments, wiring
 from procedures.servomotor.conventions import conventions
-from procedures.servomotor.parameters import named, needed, stated, write
+from procedures.servomotor.parameters import named, stated, write
 from procedures.shared import assumptions
+
+if TYPE_CHECKING:
+    from procedures.angle_step.estimates import Result
 
 RISE = Quantity("rise_time", "s", "10 to 90 % of the step of the angle")
 OVERSHOOT = Quantity("overshoot", "1", "greatest angle beyond the step, as a share of it")
@@ -43,16 +45,6 @@ BOUND = Quantity("bound_excess", "A", "greatest torque current beyond what force
 CAPTURED = (AMPLITUDE, BOUND)
 MEASURES = (RISE, OVERSHOOT, SETTLING, FINAL, PEAK, EXCESS, SATURATED, *CAPTURED)
 TORQUE_CONSTANT = 2.87  # N m/A, T Table 6.2; for predictions before a run, and for nothing that is measured
-NEEDED = (
-    "motor.share",
-    "motor.share_slew",
-    "motor.allocation",
-    "motor.segment_limit",
-    "motor.ramp",
-    "angle.low_pass_hz",
-    "angle.derivative_on_error",
-    "angle.slew",
-)
 UPLOAD_S = 0.5  # what the upload of a capture is given at least
 CODES = {"static": 0.0, "priority": 1.0}
 
@@ -154,6 +146,8 @@ class Results:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     """The response of each case."""
+    from procedures.angle_step import checks, estimates
+
     findings.gate(segments.before_carrying(recording))
     plan, rig = recording.plan, recording.rig
     moves = read_moves(recording)
@@ -205,21 +199,9 @@ def _too_fast(rig: RigFile, plan: Plan) -> Iterator[str]:
 
 def figures(results: Results, recording: Recording[Plan]) -> Iterable[Figure]:
     """Orbits, angle and segment currents of the largest step, and peaks over the cases."""
+    from procedures.angle_step import figures as drawn
+
     return drawn.all_figures(results.moves, results.by_case, recording.rig)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig's machine has."""
-    machine = conventions(rig)
-    return Requires(
-        lacks=machine.lacks,
-        roles=("levitation", "rotation"),
-        channels=(*channels(machine), *wiring.channels(machine)),
-        sensors=(*positions(machine), *(machine.segments if bounds.bounded(rig) else ())),
-        parameters=needed(rig, *hold.NEEDED, *wiring.needs(rig), *NEEDED),
-        uses=("capture",),
-        machine=("polar_inertia",),
-    )
 
 
 procedure = Procedure(

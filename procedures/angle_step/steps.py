@@ -13,6 +13,7 @@ from bench.errors import AnalysisError
 from bench.recording import Recording, Step
 from bench.rigfile.roles import ANGLE, STATUS
 from procedures.angle_step.bounds import Swing, read_swing
+from procedures.angle_step.requires import channels, positions
 from procedures.angle_step.response import Move
 from procedures.servomotor.conventions import Servomotor, conventions, displacement
 from procedures.servomotor.parameters import parameter
@@ -21,16 +22,6 @@ Array = npt.NDArray[np.float64]
 STEP = "move"
 ANSWERS = 0.5  # of its greatest: the torque current that answers a step
 ANSWER_A = 0.2  # of torque current: well above its noise, a twentieth of the smallest sensible step's
-
-
-def positions(machine: Servomotor) -> tuple[str, ...]:
-    """Where the shaft is, inboard first."""
-    return machine.positions_of("xi", "yi", "xo", "yo")
-
-
-def channels(machine: Servomotor) -> tuple[str, ...]:
-    """What is recorded of a step."""
-    return (ANGLE, *positions(machine), *machine.segments, STATUS)
 
 
 @dataclass(frozen=True)

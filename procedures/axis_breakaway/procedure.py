@@ -7,25 +7,22 @@ give way, as a share of one friction along the path.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
 
 from bench.errors import AnalysisError
 from bench.figures import Figure
 from bench.findings import Effect, Finding, Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
 from bench.rigfile.stage import axes_of
-from procedures.axis_breakaway import checks, estimates
-from procedures.axis_breakaway import figures as drawn
-from procedures.axis_breakaway.estimates import Result
 from procedures.axis_breakaway.moves import acquire
 from procedures.axis_breakaway.plan import Plan
+from procedures.axis_breakaway.requires import requires
 from procedures.axis_breakaway.sequence import (
     BACK,
-    INTEGRATORS,
     PULLS,
     RADIUS,
     chosen,
@@ -37,9 +34,12 @@ from procedures.axis_breakaway.sequence import (
     ramp,
 )
 from procedures.axis_breakaway.sequence import step_count as counted
-from procedures.axis_breakaway.steps import STATE, read_ramps
+from procedures.axis_breakaway.steps import read_ramps
 from procedures.shared.default_masses import nth_lightest
 from procedures.stages import assumptions
+
+if TYPE_CHECKING:
+    from procedures.axis_breakaway.estimates import Result
 
 STICKS = "force at which it begins to move, raised slowly, mean of both ways"
 MEASURES = (
@@ -53,6 +53,8 @@ MEASURES = (
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     """Breakaway of each axis, and of both."""
+    from procedures.axis_breakaway import checks, estimates
+
     rig, plan = recording.rig, recording.plan
     try:
         ramps = read_ramps(recording)
@@ -66,6 +68,8 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
 
 def measured(r: Result) -> Iterator[Measured]:
     """The quantities, kind by kind."""
+    from procedures.axis_breakaway import estimates
+
     for quantity in MEASURES:
         for (name, where), estimate in r.estimates.items():
             if name == quantity.name:
@@ -74,6 +78,8 @@ def measured(r: Result) -> Iterator[Measured]:
 
 def figures(r: Result, recording: Recording[Plan]) -> Iterable[Figure]:
     """The circle and repeats."""
+    from procedures.axis_breakaway import figures as drawn
+
     del recording
     return drawn.all_figures(r)
 
@@ -101,21 +107,6 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
             yield from (f"helix {share:g}: {problem}" for problem in envelope.problems_of(wanted))
     if any(share <= 0 for share in plan.helix) or len(set(plan.helix)) < len(plan.helix):
         yield f"helix: found {', '.join(f'{s:g}' for s in plan.helix)}; expected shares above 0, each once"
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig has."""
-    axes = axes_of(rig).values()
-    lacks = [f"capabilities.positioning.axes.{a.name}: found no {part}" for a in axes for part in ("asked", "rate")
-             if not getattr(a, part)]  # fmt: skip
-    lacks += [f"hooks, levers: found none that pull {a.name} both ways" for a in axes if not loads(rig, a)]
-    return Requires(
-        roles=("motion", "operator"),
-        channels=(*(a.channel for a in axes), STATE) if axes else (),
-        capabilities=("positioning", f"settings.{INTEGRATORS}"),
-        masses=True,
-        lacks=tuple(lacks),
-    )
 
 
 def untold(rig: RigFile) -> tuple[Quantity, ...]:

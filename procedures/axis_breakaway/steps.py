@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
+from bench.rigfile.roles import STATE
 from bench.rigfile.stage import StageAxis, axes_of
 from procedures.axis_breakaway.fit import broke_away, rise
 from procedures.axis_breakaway.moves import HELIX, RAMP
@@ -19,7 +20,6 @@ from procedures.stages import spread
 from procedures.stages.map_bends import currents, moves
 
 Array = npt.NDArray[np.float64]
-STATE = "state"
 FEWEST = 100  # samples of a ramp
 BEFORE = 50  # samples: an axis on an edge of its counts throws its loop's force about for some
 AT_LIMIT = 0.98  # of the greatest force

@@ -7,22 +7,20 @@ of the one friction along the path of the surface where both axes move.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
 
 from bench.errors import AnalysisError
 from bench.figures import Figure
 from bench.findings import Effect, Finding, Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
 from bench.rigfile.stage import axes_of
-from procedures.axis_friction import checks, estimates
-from procedures.axis_friction import figures as drawn
-from procedures.axis_friction.estimates import Result
 from procedures.axis_friction.moves import acquire
 from procedures.axis_friction.plan import Plan
+from procedures.axis_friction.requires import requires
 from procedures.axis_friction.sequence import (
     chosen,
     crossed,
@@ -38,9 +36,12 @@ from procedures.axis_friction.sequence import (
     written,
 )
 from procedures.axis_friction.sequence import step_count as counted
-from procedures.axis_friction.steps import STATE, read_passes
+from procedures.axis_friction.steps import read_passes
 from procedures.shared.default_masses import nth_lightest
 from procedures.stages import assumptions
+
+if TYPE_CHECKING:
+    from procedures.axis_friction.estimates import Result
 
 DRY = "friction at no speed, by a line over constant rates, mean of both ways"
 WET = "slope of friction over the rate, mean of both ways"
@@ -58,6 +59,8 @@ MEASURES = (
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     """Friction, and the radius."""
+    from procedures.axis_friction import checks, estimates
+
     rig, plan = recording.rig, recording.plan
     try:
         passes = read_passes(recording)
@@ -79,6 +82,8 @@ def measured(r: Result) -> Iterator[Measured]:
 
 def figures(r: Result, recording: Recording[Plan]) -> Iterable[Figure]:
     """Friction over rates and ratios."""
+    from procedures.axis_friction import figures as drawn
+
     return drawn.all_figures(r, recording.plan.scale)
 
 
@@ -106,19 +111,6 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
             yield from (f"helix: {problem}" for problem in envelope.problems_of({pair[0].target: end}))
         far = max(helix_turns(pair, plan, rate) for rate in plan.helix_rad_s) + start(pair[1], plan, plan.repeats)
         yield from (f"helix: {problem}" for problem in envelope.problems_of({pair[1].target: far}))
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig has."""
-    axes = axes_of(rig).values()
-    lacks = [f"capabilities.positioning.axes.{a.name}: found no {part}" for a in axes for part in ("asked", "rate")
-             if not getattr(a, part)]  # fmt: skip
-    return Requires(
-        roles=("motion",),
-        channels=(*(a.channel for a in axes), STATE) if axes else (),
-        capabilities=("positioning",),
-        lacks=tuple(lacks),
-    )
 
 
 def untold(rig: RigFile) -> tuple[Quantity, ...]:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
+from bench.rigfile.roles import STATE
 from bench.rigfile.stage import StageAxis, axes_of
 from procedures.axis_friction.moves import HELIX, PASS
 from procedures.axis_friction.plan import Plan
@@ -17,7 +18,6 @@ from procedures.axis_friction.sequence import window
 from procedures.stages.map_bends import currents, moves
 
 Array = npt.NDArray[np.float64]
-STATE = "state"
 FEWEST = 20  # samples in a window
 AT_LIMIT = 0.98  # of the greatest force
 

@@ -6,27 +6,28 @@ Measurands, by axis: mass along, kg, or moment of inertia around, kg m^2, of the
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
 
 from bench.errors import AnalysisError
 from bench.figures import Figure
 from bench.findings import Effect, Finding, Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
 from bench.rigfile.stage import axes_of
-from procedures.axis_inertia import checks, estimates
-from procedures.axis_inertia import figures as drawn
-from procedures.axis_inertia.estimates import Result
 from procedures.axis_inertia.moves import acquire
 from procedures.axis_inertia.plan import Plan
+from procedures.axis_inertia.requires import requires
 from procedures.axis_inertia.sequence import chosen, known, plays, tones
 from procedures.axis_inertia.sequence import step_count as counted
-from procedures.axis_inertia.steps import STATE, read_sines
+from procedures.axis_inertia.steps import read_sines
 from procedures.stages import assumptions
 from procedures.stages.spread import middle, turns
+
+if TYPE_CHECKING:
+    from procedures.axis_inertia.estimates import Result
 
 MASS = Quantity("mass", "kg", "of what moves along an axis, by the ratio to a part of known mass")
 INERTIA = Quantity("inertia", "kg m^2", "of what turns around an axis, by the ratio to a part of known moment of inertia",
@@ -36,6 +37,8 @@ MEASURES = (MASS, INERTIA)
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     """What each axis moves."""
+    from procedures.axis_inertia import checks, estimates
+
     rig, plan = recording.rig, recording.plan
     try:
         sines = read_sines(recording)
@@ -58,6 +61,8 @@ def measured(r: Result) -> Iterator[Measured]:
 
 def figures(r: Result, recording: Recording[Plan]) -> Iterable[Figure]:
     """By repeats."""
+    from procedures.axis_inertia import figures as drawn
+
     del recording
     return drawn.all_figures(r)
 
@@ -79,20 +84,6 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
             if not turns(axis):
                 wanted[axis.target] = middle(axis) + tone.amplitude
             yield from (f"{axis.name} at {tone.hz:g} Hz: {problem}" for problem in envelope.problems_of(wanted))
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig has."""
-    able = [a for a in axes_of(rig).values() if plays(a)]
-    if axes_of(rig) and not able:
-        return Requires(roles=("motion",), capabilities=("positioning",),
-                        lacks=("capabilities.positioning.axes: found no wave with a sine",))  # fmt: skip
-    return Requires(
-        roles=("motion",),
-        channels=(*(a.channel for a in able), STATE) if able else (),
-        machine=tuple(dict.fromkeys(known(a, Plan.model_validate({})) for a in able)),
-        capabilities=("positioning",),
-    )
 
 
 def untold(rig: RigFile) -> tuple[Quantity, ...]:

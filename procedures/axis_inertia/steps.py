@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
+from bench.rigfile.roles import STATE
 from bench.rigfile.stage import axes_of
 from procedures.axis_inertia import fit
 from procedures.axis_inertia.moves import TONE, recorded_s
@@ -17,7 +18,6 @@ from procedures.axis_inertia.plan import Plan
 from procedures.stages.map_bends import currents, moves
 
 Array = npt.NDArray[np.float64]
-STATE = "state"
 FEWEST = 200  # samples of a sine
 AT_LIMIT = 0.98  # of the greatest force
 APART = 0.02  # of it: force that is asked for and not given

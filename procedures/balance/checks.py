@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -12,7 +11,6 @@ import numpy as np
 
 from bench.analysis.balance import G_MM, bound
 from bench.findings import Effect, Finding
-from bench.procedure.requires import Requires
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.units import RPM
@@ -31,7 +29,7 @@ from procedures.balance.steps import (
 from procedures.synchronous import checks as dwell_checks
 from procedures.synchronous import fitting
 from procedures.synchronous.bearings import Known
-from procedures.synchronous.dwells import SLOW, required
+from procedures.synchronous.dwells import SLOW
 
 MOST_RPM = 10000.0  # influence runs
 RATE_HZ = 1e4  # of the captures, the controller's own; order 1 alone is read
@@ -41,13 +39,6 @@ SAME_PLACE_RAD = math.radians(0.1)
 DIFFERS = (
     0.02  # of what was mounted: how far a verification may be from the prediction, beside three times its uncertainty
 )
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig's machine has."""
-    needed = required(rig)
-    return replace(needed, lacks=(*needed.lacks, *planes.missing(rig)),
-                   uses=(*needed.uses, "bias", "gains", "model", "flatness"))  # fmt: skip
 
 
 def of_plan(rig: RigFile, plan: Plan) -> Iterable[str]:

@@ -7,7 +7,7 @@ permissible residual unbalance; influence coefficients.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from bench.figures import Shown
 from bench.findings import Effect, Ended, Finding, Findings
@@ -19,12 +19,11 @@ from bench.units import RPM
 from procedures.amb_rotor import lift, pushes, wiring
 from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.laws import of_laws
-from procedures.balance import checks, decision, estimates, sequence
-from procedures.balance import figures as drawn
-from procedures.balance.estimates import Result
+from procedures.balance import checks, decision, sequence
 from procedures.balance.hum import of_balance
 from procedures.balance.plan import Plan
 from procedures.balance.planes import names_of
+from procedures.balance.requires import requires
 from procedures.balance.steps import BASE, known_by, read_runs
 from procedures.shared import assumptions, first_look
 from procedures.synchronous import bearings, dwelling
@@ -32,6 +31,9 @@ from procedures.synchronous import checks as dwell_checks
 from procedures.synchronous.default_speeds import within_envelope
 from procedures.synchronous.dwells import SLOW
 from procedures.synchronous.hum import listen
+
+if TYPE_CHECKING:
+    from procedures.balance.estimates import Result
 
 FOUND_COS = Quantity(
     "unbalance_cos",
@@ -101,6 +103,9 @@ def fewest_steps(plan: Plan) -> int:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     """Unbalance as found and as left, and the influence coefficients at the highest speed."""
+    from procedures.balance import estimates
+    from procedures.balance.estimates import Result
+
     first_look.gate(recording, findings, wiring.before_orbits(recording))
     findings.gate([*wiring.before_orbits(recording), *dwell_checks.before(recording), *checks.refusals(recording)],
                   ("no-dwells", "sensor-polarity", "lift-lost", "stuck-channel"))  # fmt: skip
@@ -133,6 +138,8 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
 
 def measured(result: Result) -> Iterator[Measured]:
     """By plane the unbalance as found and as left; the influence coefficients by probe and plane."""
+    from procedures.balance import estimates
+
     balance, last = result.balance, result.last
     for p, side in enumerate(names_of(result.rig)):
         for quantity, k in ((FOUND_COS, 2 * p), (FOUND_SIN, 2 * p + 1)):
@@ -155,6 +162,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(result: Result, recording: Recording[Plan]) -> Iterable[Shown]:
     """Polar plots of the vectors, influence coefficients, residual against U_per."""
+    from procedures.balance import figures as drawn
+
     del recording
     return drawn.all_figures(result)
 
@@ -175,7 +184,7 @@ procedure = Procedure(
     evaluate=evaluate,
     measured=measured,
     figures=figures,
-    requires=checks.requires,
+    requires=requires,
     check=check,
     settings=settings,
     step_count=step_count,

@@ -8,11 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from bench.errors import AnalysisError, Lacking
+from bench.errors import AnalysisError
 from bench.figures import Figure
 from bench.findings import Effect, Finding, Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import Load, RigState
 from bench.procedure.states import transition, within_reach
@@ -20,12 +19,12 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
-from procedures.bearing_constant import checks, estimates
-from procedures.bearing_constant import figures as drawn
+from procedures.bearing_constant import estimates
 from procedures.bearing_constant.estimates import Result
 from procedures.bearing_constant.plan import Plan
-from procedures.bearing_constant.stand import captured, hooks, masses, planes, rate, set_points, settle_s, visits
-from procedures.bearing_constant.steps import STATE, VISIT, read_visits
+from procedures.bearing_constant.requires import requires
+from procedures.bearing_constant.stand import captured, hooks, masses, rate, set_points, settle_s, visits
+from procedures.bearing_constant.steps import VISIT, read_visits
 from procedures.shared import assumptions, planned
 from procedures.shared.rates import of_rate
 
@@ -69,6 +68,8 @@ def _look(rig: Rig, plan: Plan, record: Recorder, hangs: Load, number: int) -> N
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     """Constants by all visits."""
+    from procedures.bearing_constant import checks
+
     rig, plan = recording.rig, recording.plan
     seen = read_visits(recording)
     findings.gate(checks.of_signals(seen, plan, rig))
@@ -108,37 +109,10 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(r: Result, recording: Recording[Plan]) -> Iterable[Figure]:
     """The current of each plane over the weight."""
+    from procedures.bearing_constant import figures as drawn
+
     del recording
     return drawn.all_figures(r)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig has."""
-    needed = ("coil_map", "loop_injection", "motion")
-    lacks: list[str] = []
-    if not rig.hooks:
-        lacks.append("hooks: found none; expected where masses hang on the mover")
-    if rig.capabilities.coil_map is None or rig.capabilities.motion is None or rig.capabilities.loop_injection is None:
-        return Requires(
-            roles=("levitation", "operator"), capabilities=needed, masses=True, capture=(), lacks=tuple(lacks)
-        )
-    try:
-        two = planes(rig)
-    except Lacking as error:
-        two = ()
-        lacks.append(str(error))
-    if len(two) != 2:
-        lacks.append(f"capabilities.coil_map: found {len(two)} systems that give a radial force; expected two")
-    return Requires(
-        roles=("levitation", "operator"),
-        channels=(STATE,),
-        sensors=tuple(coil for plane in two for coil in plane.system.coils),
-        capabilities=needed,
-        capture=captured(rig) if two else (),
-        masses=True,
-        uses=("hold",),
-        lacks=tuple(lacks),
-    )
 
 
 def left_out(plan: Plan) -> tuple[Quantity, ...]:

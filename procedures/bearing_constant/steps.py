@@ -9,13 +9,14 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.recording import Recording, Step
+from bench.rigfile.roles import STATE
 from procedures.bearing_constant.plan import Plan
 from procedures.bearing_constant.stand import captured, planes
 from procedures.position_loops.injection import ability
 from procedures.shared.weight import weight
 
 Array = npt.NDArray[np.float64]
-VISIT, STATE = "visit", "state"
+VISIT = "visit"
 
 
 @dataclass(frozen=True)

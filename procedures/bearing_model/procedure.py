@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from bench.errors import DeviceFault, OperatorAbort
 from bench.figures import Figure
 from bench.findings import Finding, Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.procedure.states import transition
@@ -23,19 +23,20 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from procedures.amb_rotor import frame, lift, liftable, pushes, rings
 from procedures.amb_rotor.conventions import AMB_ROTOR, conventions
-from procedures.amb_rotor.places import HOLD, LIFT, LIFT_LOST, REST, TILT, Held, channels, of_readings, read_steps
-from procedures.amb_rotor.stations import COORDINATES
-from procedures.bearing_model import checks, estimates, wiring
-from procedures.bearing_model import figures as drawn
+from procedures.amb_rotor.places import HOLD, LIFT, LIFT_LOST, REST, TILT, Held, of_readings, read_steps
+from procedures.bearing_model import wiring
 from procedures.bearing_model.comparison import COMPARED
-from procedures.bearing_model.estimates import Analysis
 from procedures.bearing_model.fitting import check
 from procedures.bearing_model.grid import biases, count_places, places, tilts
-from procedures.bearing_model.inputs import as_printed, lacking
+from procedures.bearing_model.inputs import as_printed
 from procedures.bearing_model.plan import Plan
+from procedures.bearing_model.requires import requires
 from procedures.bearing_model.stillness import await_still
 from procedures.bearing_model.walking import Place, go
 from procedures.shared import assumptions, first_look
+
+if TYPE_CHECKING:
+    from procedures.bearing_model.estimates import Analysis
 
 OF_LINEAR = {
     "k_linear": Quantity("k_linear", "N/A", "K_i of the linear model without intercept (not a slope of the bearing)"),
@@ -187,6 +188,8 @@ def read(recording: Recording[Plan]) -> tuple[Held, Held]:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     """The adjustment of all positions, and both models compared."""
+    from procedures.bearing_model import checks, estimates
+
     findings.gate([*rings.before(recording), *pushes.of_recording(recording), *liftable.of_recording(recording)])
     held, tilted = read(recording)
     findings.gate(first_look.with_first(recording, _of_data(recording, held, tilted)), checks.FATAL)
@@ -208,6 +211,8 @@ def measured(a: Analysis) -> Iterator[Measured]:
 
 
 def _of_data(recording: Recording[Plan], held: Held, tilted: Held) -> Iterator[Finding]:
+    from procedures.bearing_model import checks
+
     plan, rig = recording.plan, recording.rig
     found = [*checks.of_signals(held, tilted, plan), *wiring.of_wiring(held, tilted, rig)]
     yield from found
@@ -217,21 +222,9 @@ def _of_data(recording: Recording[Plan], held: Held, tilted: Held) -> Iterator[F
 
 def figures(a: Analysis, recording: Recording[Plan]) -> Iterable[Figure]:
     """Positions, currents, forces by both models and residuals."""
+    from procedures.bearing_model import figures as drawn
+
     return drawn.all_figures(a, recording.rig)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig's machine has."""
-    machine = conventions(rig)
-    channels_of = (*machine.stations.channels, *machine.currents)
-    moves = machine.unmoved(COORDINATES)
-    return Requires(
-        lacks=() if as_printed(rig) else (*lacking(rig), *moves),
-        channels=channels(machine),
-        sensors=channels_of,
-        capabilities=("set_points",),
-        uses=("bias", "settings.law", "settings.integrator", "current_limit"),
-    )
 
 
 procedure = Procedure(

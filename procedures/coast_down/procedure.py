@@ -11,6 +11,7 @@ from bench.procedure.roles import RigState
 from bench.recording.recorder import Recorder
 from procedures.amb_rotor import lift, pushes
 from procedures.coast_down.plan import Plan
+from procedures.coast_down.requires import requires
 from procedures.run_up import procedure as run_up
 from procedures.shared import assumptions
 from procedures.synchronous import bearings
@@ -38,7 +39,7 @@ procedure = Procedure(
     evaluate=run_up.evaluate,
     measured=run_up.measured,
     figures=run_up.figures,
-    requires=run_up.requires,
+    requires=requires,
     check=run_up.check,
     settings=run_up.settings,
     step_count=run_up.step_count,

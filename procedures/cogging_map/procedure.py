@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from typing import TYPE_CHECKING
 
 from bench.calibration import Need
 from bench.errors import AnalysisError, BenchError
 from bench.figures import Figure
 from bench.findings import Effect, Finding, Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
@@ -23,16 +23,17 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
 from bench.uncertainty import Estimate
-from procedures.cogging_map import checks, estimates
-from procedures.cogging_map import figures as drawn
-from procedures.cogging_map.estimates import Result
 from procedures.cogging_map.plan import Plan
-from procedures.cogging_map.steps import STATE, SWEEP, read_passes
+from procedures.cogging_map.requires import DEFAULTS, requires
+from procedures.cogging_map.steps import SWEEP, read_passes
 from procedures.cogging_map.sweeps import Way, fed, loops, way
 from procedures.position_loops.injection import ability
-from procedures.position_loops.motors import around, motors, periods_of
+from procedures.position_loops.motors import around
 from procedures.shared import assumptions, planned
 from procedures.synchronous.dwells import telemetry_period_s
+
+if TYPE_CHECKING:
+    from procedures.cogging_map.estimates import Result
 
 CURRENT = Quantity("cogging_current", "A", "amplitude of the first harmonic of the current that takes cogging off")
 PEAK_CURRENT = Quantity("peak_current", "A", "greatest current that takes cogging off, by its first two harmonics")
@@ -51,7 +52,6 @@ FRICTION_TORQUE = Quantity("friction_torque", "N m", "half of what the torque up
 FORCES, TORQUES = (FORCE, PEAK_FORCE, FRICTION_FORCE), (TORQUE, PEAK_TORQUE, FRICTION_TORQUE)
 MEASURES = (CURRENT, PEAK_CURRENT, FRICTION_CURRENT, PHASE, SHARE, *FORCES, *TORQUES)
 CONSTANTS, ZEROS = "actuator-constant", "encoder-zero"
-DEFAULTS = Plan.model_validate({})
 
 
 def step_count(plan: Plan) -> int:
@@ -122,6 +122,8 @@ def _swept(rig: Rig, plan: Plan, of: Way) -> Iterator[None]:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> list[Result]:
     """Harmonics of each loop."""
+    from procedures.cogging_map import checks, estimates
+
     rig, plan, passes = recording.rig, recording.plan, read_passes(recording)
     findings.gate(checks.of_signals(passes, rig, plan))
     facts: dict[str, Estimate] = {}
@@ -169,39 +171,9 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(results: Sequence[Result], recording: Recording[Plan]) -> Iterable[Figure]:
     """The map of each loop."""
+    from procedures.cogging_map import figures as drawn
+
     return drawn.all_figures(results, recording.rig)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig has."""
-    can, driving = rig.capabilities.loop_injection, rig.capabilities.force_currents
-    wanted = ("loop_injection", "force_currents", "motion")
-    if can is None or not driving or rig.capabilities.motion is None:
-        return Requires(capabilities=wanted)
-    of = {name: one for name, one in driving.items() if one.cogging}
-    shown = tuple(dict.fromkeys(can.loops[one.loop].channel for one in of.values()))
-    return Requires(
-        channels=(*shown, *(one.current for one in of.values()), STATE),
-        sensors=tuple(c for name in of for c in rig.motors[name].currents),
-        machine=periods_of(rig, "machine", of),
-        geometry=periods_of(rig, "geometry", of),
-        capabilities=wanted,
-        lacks=tuple(_lacks(rig)),
-    )
-
-
-def _lacks(rig: RigFile) -> Iterator[str]:
-    if not loops(rig, DEFAULTS):
-        yield "capabilities.force_currents: found no cogging of a motor whose loop a set point moves"
-    for loop in loops(rig, DEFAULTS):
-        if not ability(rig).loops[loop].inertia:
-            yield f"capabilities.loop_injection.loops.{loop}: found no inertia"
-        some = motors(rig, loop)
-        for name, one in some.items():
-            if one.constant is None:
-                yield f"capabilities.force_currents.{name}.constant: found none"
-        if len({(one.cogging, one.period) for one in some.values()}) > 1:
-            yield f"capabilities.force_currents: found motors of {loop} with another period of cogging each"
 
 
 def untold(rig: RigFile) -> tuple[Quantity, ...]:

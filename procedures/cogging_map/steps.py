@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.recording import Recording, Step
+from bench.rigfile.roles import STATE
 from procedures.cogging_map.plan import Plan
 from procedures.cogging_map.sweeps import Way, way
 from procedures.position_loops.injection import ability
@@ -17,7 +18,6 @@ from procedures.position_loops.motors import around, motors
 
 Array = npt.NDArray[np.float64]
 SWEEP = "sweep"
-STATE = "state"
 
 
 @dataclass(frozen=True)

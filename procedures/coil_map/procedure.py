@@ -13,26 +13,30 @@ a sensor whose gain is off by 0.5 % makes its coil's current off by as much, les
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
 
 from bench.figures import Shown
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.rigfile import RigFile
-from procedures.coil_map import checks, estimates, figures
-from procedures.coil_map.estimates import Result
 from procedures.coil_map.moving import FAR, moved, settings
 from procedures.coil_map.plan import Plan
+from procedures.coil_map.requires import requires
 from procedures.coil_map.steps import PULSE, TOUR, points, pulses, radial, read_pulses, read_tours
 from procedures.shared import assumptions
+
+if TYPE_CHECKING:
+    from procedures.coil_map.estimates import Result
 
 SHARE = Quantity("share", "1", "true current of a coil, of what its systems' currents ask of it")
 
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     """What flowed and what moved. Motion is read where currents are right: else it says nothing of the winding."""
+    from procedures.coil_map import checks, estimates
+
     plan, taken = recording.plan, read_pulses(recording)
     far = [(str(e["axis"]), float(e["moved"]), float(e["limit"])) for e in recording.events(FAR)]
     steps = [*recording.steps(PULSE), *recording.steps(TOUR)]
@@ -55,6 +59,8 @@ def measured(r: Result) -> Iterator[Measured]:
 
 def drawn(r: Result, _: Recording[Plan]) -> Iterable[Shown]:
     """Both tables, and each push that was turned around."""
+    from procedures.coil_map import figures
+
     return figures.all_figures(r)
 
 
@@ -81,22 +87,6 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
         yield f"hold_s: found {plan.hold_s:g} s; {can.lasts} is at most {rig.parameters[can.lasts].high:g} s"
     if plan.rest_s > plan.hold_s / 2:
         yield f"rest_s: found {plan.rest_s:g} s; expected half of hold_s, {plan.hold_s / 2:g} s, or less"
-
-
-def requires(rig: RigFile) -> Requires:
-    """The winding's table, what captures read of it, and sensors of its currents that have certificates."""
-    can = rig.capabilities.coil_map
-    if can is None:
-        return Requires(capabilities=("coil_map",))
-    systems = can.systems.values()
-    read = [name for s in systems for name in (s.read_d, s.read_q, s.angle)]
-    return Requires(
-        channels=can.axes,
-        sensors=can.coils,
-        parameters=(*(name for s in systems for name in (s.d, s.q)), *((can.lasts,) if can.lasts else ())),
-        capture=tuple(dict.fromkeys((*can.coils, *can.bridges.values(), *read, *can.axes))),
-        capabilities=("coil_map",),
-    )
 
 
 procedure = Procedure(

@@ -7,27 +7,26 @@ the switch; what is left of mean and amplitude in steady state.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from bench.errors import AnalysisError
 from bench.figures import Shown
 from bench.findings import Effect, Finding, Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from bench.rigfile.recorded import AGE, COUNT
 from bench.uncertainty import Estimate
 from bench.units import RPM
 from procedures.amb_rotor import lift, pushes
 from procedures.amb_rotor.conventions import conventions
-from procedures.compensation import checks, switching
-from procedures.compensation import figures as drawn
+from procedures.compensation import switching
 from procedures.compensation.hum import of_switch
 from procedures.compensation.plan import Plan
+from procedures.compensation.requires import requires
 from procedures.compensation.switching import SWITCH, Switched
 from procedures.shared import assumptions
 from procedures.synchronous import bearings, dwelling
@@ -36,6 +35,9 @@ from procedures.synchronous.hum import listen
 from procedures.unbalance import figures as unbalance_figures
 from procedures.unbalance import procedure as unbalance
 from procedures.unbalance import sequence
+
+if TYPE_CHECKING:
+    from procedures.compensation import checks
 
 REDUCTION = Quantity(
     "reduction",
@@ -103,6 +105,8 @@ class Compared:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Compared:
     """The dwells as in `unbalance`, the reductions, and the switch where it was captured."""
+    from procedures.compensation import checks
+
     results = unbalance.evaluate(recording, findings)
     reductions = checks.reductions(results)
     findings.add(checks.describe(results, reductions, recording.plan.judged_to_rad_s))
@@ -149,19 +153,12 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(found: Compared, recording: Recording[Plan]) -> Iterable[Shown]:
     """Those of `unbalance`, the reduction over the speed, and the switch."""
+    from procedures.compensation import figures as drawn
+
     yield from drawn.draw_reductions(found.reductions)
     if found.captured is not None:
         yield from drawn.draw_switch(found.captured)
     yield from unbalance_figures.all_figures(found.results, recording.rig)
-
-
-def requires(rig: RigFile) -> Requires:
-    """What the unbalance response needs, and a controller that compensates."""
-    needed, machine = unbalance.requires(rig), conventions(rig)
-    return replace(
-        needed, capabilities=(*needed.capabilities, "settings.compensation.corrected", "settings.compensation.waiting"),
-        capture=(*needed.capture, *machine.positions, *(machine.pulsed or (COUNT, AGE))),
-    )  # fmt: skip
 
 
 procedure = Procedure(

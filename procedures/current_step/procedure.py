@@ -9,22 +9,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from bench.errors import Lacking
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.capture import Layout
-from procedures.current_step import checks, estimates, fit
-from procedures.current_step import figures as drawn
-from procedures.current_step.estimates import Place
+from procedures.current_step import fit
 from procedures.current_step.plan import Plan
+from procedures.current_step.requires import requires
 from procedures.current_step.steps import (
     LARGE,
     PUSH,
@@ -36,6 +35,9 @@ from procedures.current_step.steps import (
     read_taken,
 )
 from procedures.shared import assumptions
+
+if TYPE_CHECKING:
+    from procedures.current_step.estimates import Place
 
 RISE = Quantity("rise_time", "s", "10 to 90 % of the large step, with whatever limits act on its way")
 FALL = Quantity("fall_time", "s", "10 to 90 % of the large step back")
@@ -124,6 +126,8 @@ def _captured(rig: Rig, plan: Plan, record: Recorder, kind: str, attempt: int, l
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     """Steps at every place, what limited them, and whether the mover stayed."""
+    from procedures.current_step import checks, estimates
+
     plan, taken = recording.plan, read_taken(recording)
     findings.gate([*checks.of_pushes(read_pushed(recording), plan), *checks.of_signals(taken, plan)])
     places = estimates.evaluate(taken, recording.rig, plan)
@@ -142,6 +146,8 @@ def measured(result: Result) -> Iterator[Measured]:
 
 def figures(result: Result, recording: Recording[Plan]) -> Iterable[Figure]:
     """Of each place the large step along and across, what the half-bridges did, and the response of the small step."""
+    from procedures.current_step import figures as drawn
+
     return drawn.all_figures(result.places, recording.plan)
 
 
@@ -168,16 +174,6 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
         if (needed := size * seconds(plan, LARGE) / tick_s) > rig.capture.memory_bytes:
             yield (f"hold_s: a capture of {seconds(plan, LARGE):.3g} s takes {needed:.0f} bytes; the controller's memory holds "
                    f"{rig.capture.memory_bytes}")  # fmt: skip
-
-
-def requires(rig: RigFile) -> Requires:
-    """Currents that are stepped, and what captures read of each."""
-    steps = rig.capabilities.current_steps.values()
-    return Requires(
-        capabilities=("current_steps",),
-        parameters=tuple(step.parameter for step in steps),
-        capture=tuple(dict.fromkeys(name for step in steps for name in (step.along, step.across))),
-    )
 
 
 procedure = Procedure(

@@ -14,7 +14,6 @@ from bench.errors import Lacking
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.procedure.states import transition
@@ -23,14 +22,14 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
 from bench.rigfile.stage import StageAxis, axes_of
-from procedures.decoupling import checks, estimates
-from procedures.decoupling import figures as drawn
+from procedures.decoupling import estimates
 from procedures.decoupling.estimates import Result, coupling_of, excursion_of, named, ratio_of
 from procedures.decoupling.plan import Plan
-from procedures.decoupling.steps import ALONE, FAST, NUDGED, SLOW, SPARE_S, STATE, read_runs
+from procedures.decoupling.requires import requires
+from procedures.decoupling.steps import ALONE, FAST, NUDGED, SLOW, SPARE_S, read_runs
 from procedures.shared import planned
 from procedures.stages import assumptions, map_model
-from procedures.stages.pairs import lacks, pairs, played, silenced, sine, waits_at
+from procedures.stages.pairs import pairs, played, silenced, sine, waits_at
 
 PLACE = Quantity("excursion", "m", "largest distance of the held axis from its set point, by its encoder")
 ANGLE = Quantity("excursion_angle", "rad", "largest angle of the held axis from its set point, by its encoder",
@@ -149,6 +148,8 @@ def _rest(rig: Rig, plan: Plan) -> None:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> list[Result]:
     """Each pair."""
+    from procedures.decoupling import checks
+
     rig, plan, runs = recording.rig, recording.plan, read_runs(recording)
     period_s = recording.streams["telemetry"].period_ns * 1e-9
     findings.gate(checks.of_signals(runs, rig, plan, period_s))
@@ -213,19 +214,9 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(results: Sequence[Result], recording: Recording[Plan]) -> Iterable[Figure]:
     """Traces, then cross forces."""
+    from procedures.decoupling import figures as drawn
+
     return drawn.all_figures(results, recording.plan)
-
-
-def requires(rig: RigFile) -> Requires:
-    """A stage with two axes or more that play waves."""
-    axes = axes_of(rig).values()
-    if not axes:
-        return Requires(roles=("motion",), capabilities=("positioning",))
-    return Requires(
-        roles=("motion",), capabilities=("positioning",),
-        channels=(*(c for a in axes for c in (a.channel, a.reference, a.asked) if c), STATE),
-        uses=("settings.integrators",), lacks=tuple(lacks(rig)),
-    )  # fmt: skip
 
 
 procedure = Procedure(

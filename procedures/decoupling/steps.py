@@ -8,13 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.recording import Recording, Step
+from bench.rigfile.roles import STATE
 from procedures.decoupling.plan import Plan
 from procedures.stages.pairs import Pair, pairs
 
 Array = npt.NDArray[np.float64]
 ALONE, NUDGED = "alone", "nudged"
 SLOW, FAST = 0.5, 1.5  # periods of the held axis' own sine to one of the motion
-STATE = "state"
 SPARE_S = 0.05  # of a step, beyond its periods
 
 

@@ -7,26 +7,27 @@ sidebands, the sidebands alone; for the whole: edges of the band, the derivative
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
 
 from bench.errors import Lacking
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.capture import Layout
-from bench.rigfile.roles import STATUS
-from procedures.derivative import checks, estimates, fit
-from procedures.derivative import figures as drawn
-from procedures.derivative.estimates import Result
+from procedures.derivative import checks
 from procedures.derivative.plan import Plan
+from procedures.derivative.requires import requires
 from procedures.derivative.steps import LINE, OFFSET, QUIET, asked, read_taken
-from procedures.one_axis.conventions import VELOCITY, conventions
+from procedures.one_axis.conventions import conventions
 from procedures.shared import assumptions
+
+if TYPE_CHECKING:
+    from procedures.derivative.estimates import Result
 
 GAIN = Quantity("gain", "1", "mean gain of the velocity over the position's derivative")
 PHASE = Quantity("phase", "rad", "mean phase of the velocity before the position's derivative")
@@ -96,6 +97,8 @@ def _take(
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     """The estimator's response at each line, and what it is beside that of the weights."""
+    from procedures.derivative import estimates, fit
+
     plan, taken = recording.plan, read_taken(recording)
     known_hz = conventions(recording.rig).known(recording.rig, "harmonic_hz")
     quiet = next((t for t in taken if t.kind == QUIET and len(t.y)), None)
@@ -116,6 +119,8 @@ def measured(result: Result) -> Iterator[Measured]:
 
 def figures(result: Result, recording: Recording[Plan]) -> Iterable[Figure]:
     """Error over frequency beside that of the weights, gain and phase, sidebands."""
+    from procedures.derivative import figures as drawn
+
     return drawn.all_figures(result, recording.plan)
 
 
@@ -142,23 +147,6 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     room = rig.capture.memory_bytes / Layout.of(rig.capture, machine.captured).sample.itemsize * tick_s
     if (longest := seconds(plan, min(plan.lines_hz, default=1.0))) > room:
         yield f"lines_hz: {min(plan.lines_hz):g} Hz takes {longest:.3g} s; the controller's memory holds {room:.3g} s"
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig's machine has."""
-    machine = conventions(rig)
-    points = (
-        ()
-        if machine.axis in machine.can.set_points.axes
-        else ("capabilities.set_points.axes: found none for the axis",)
-    )
-    return Requires(
-        lacks=points,
-        channels=(machine.position, STATUS),
-        capabilities=("injection", "settings.watched", "settings.rule", "settings.compensation", "model.degree",
-                      "model.window", "model.harmonic_hz"),
-        capture=(machine.position, VELOCITY),
-    )  # fmt: skip
 
 
 procedure = Procedure(

@@ -8,27 +8,27 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import count
+from typing import TYPE_CHECKING
 
 from bench.calibration import Need
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
-from procedures.emf_constant import checks, estimates
-from procedures.emf_constant import figures as drawn
-from procedures.emf_constant.estimates import Result
 from procedures.emf_constant.moves import Line, captured, lines, rate, seconds, windings
 from procedures.emf_constant.plan import Plan
-from procedures.emf_constant.steps import MOVE, STATE, read_taken
-from procedures.position_loops.motors import periods_of
+from procedures.emf_constant.requires import requires
+from procedures.emf_constant.steps import MOVE, read_taken
 from procedures.shared import assumptions, planned
 from procedures.shared.rates import of_rate
+
+if TYPE_CHECKING:
+    from procedures.emf_constant.estimates import Result
 
 FLUX = Quantity("flux", "Wb", "flux that a motor's moving field links with one of its coils, at most")
 K_EMF = Quantity("K_emf", "N/A", "force along per ampere, by reciprocity: n/2 (d phase/dz) flux of n coils",
@@ -92,6 +92,8 @@ def _move(rig: Rig, plan: Plan, record: Recorder, line: Line, labels: dict[str, 
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> list[Result]:
     """Flux of each motor, and what its nameplate may mean."""
+    from procedures.emf_constant import checks, estimates
+
     rig, plan, taken = recording.rig, recording.plan, read_taken(recording)
     findings.gate(checks.of_signals(taken, rig, plan))
     results = estimates.results(taken, rig, plan)
@@ -126,28 +128,10 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(results: Sequence[Result], recording: Recording[Plan]) -> Iterable[Figure]:
     """What is left of the voltage beside the speed's flux, of each motor."""
+    from procedures.emf_constant import figures as drawn
+
     del recording
     return drawn.all_figures(results)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig has."""
-    wanted, of, can = ("force_currents", "coil_map", "current_steps", "motion"), windings(rig), rig.capabilities
-    if can.motion is None or can.coil_map is None or not can.force_currents or not can.current_steps:
-        return Requires(capabilities=wanted, capture=())
-    if not of:
-        return Requires(
-            capabilities=wanted, capture=(), lacks=("capabilities.current_steps: found voltages of no motor's coils",)
-        )
-    channels = tuple(n for w in of.values() for n in (w.channel, *w.coils, *w.voltages.values()))
-    return Requires(
-        channels=(STATE,),
-        sensors=tuple(n for w in of.values() for n in (*w.coils, *w.voltages.values())),
-        machine=periods_of(rig, "machine", of),
-        geometry=periods_of(rig, "geometry", of),
-        capabilities=wanted,
-        capture=tuple(dict.fromkeys(channels)),
-    )
 
 
 def untold(rig: RigFile) -> tuple[Quantity, ...]:

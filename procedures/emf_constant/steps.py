@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.recording import Recording, Step
+from bench.rigfile.roles import STATE
 from procedures.emf_constant.fit import Move, averaged
 from procedures.emf_constant.moves import captured, held, windings
 from procedures.emf_constant.plan import Plan
 
-MOVE, STATE = "move", "state"
+MOVE = "move"
 
 
 @dataclass(frozen=True)

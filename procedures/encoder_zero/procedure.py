@@ -11,27 +11,28 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import count
+from typing import TYPE_CHECKING
 
 from bench.errors import BenchError, Lacking
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
-from procedures.encoder_zero import checks, estimates, groups
-from procedures.encoder_zero import figures as drawn
-from procedures.encoder_zero.estimates import Result
-from procedures.encoder_zero.groups import ALONG, PLACES, TRIAL_REPEATS, Group, Setting, parameter_of, settings_of
+from procedures.encoder_zero import groups
+from procedures.encoder_zero.groups import PLACES, TRIAL_REPEATS, Group, Setting, parameter_of, settings_of
 from procedures.encoder_zero.plan import Plan
-from procedures.encoder_zero.steps import STATE, STEP, Taken, read_taken
-from procedures.position_loops.motors import periods_of
+from procedures.encoder_zero.requires import requires
+from procedures.encoder_zero.steps import STEP, Taken, read_taken
 from procedures.shared import assumptions, planned
 from procedures.shared.rates import of_rate
+
+if TYPE_CHECKING:
+    from procedures.encoder_zero.estimates import Result
 
 ZERO = Quantity("zero", "rad", "electrical angle of the encoder at which the motor's field lies along its first phase")
 RATIO = Quantity("K_ratio", "1", "force or torque per ampere of the one motor over that of the other")
@@ -125,6 +126,8 @@ class Results:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     """Zeros and ratios."""
+    from procedures.encoder_zero import checks, estimates
+
     taken, rig, plan = read_taken(recording), recording.rig, recording.plan
     told = tuple(checks.of_signals(taken, rig, plan))
     findings.gate(told)
@@ -163,32 +166,10 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(results: Results, recording: Recording[Plan]) -> Iterable[Figure]:
     """The current across over that along, of each motor."""
+    from procedures.encoder_zero import figures as drawn
+
     del recording
     return drawn.all_figures(results.groups, results.taken)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig has."""
-    needed = ("force_currents", "loop_injection", "current_steps", "motion")
-    can = rig.capabilities
-    if not groups.zeros(rig) or can.loop_injection is None or not can.current_steps:
-        return Requires(capabilities=needed, capture=())
-    of = groups.groups(rig)
-    across = [(m, groups.zeros(rig)[m].added) for g in of for m, way in g.stepped if way != ALONG]
-    lacks = [
-        f"capabilities.force_currents.{m}.added: found none; its loop drives other motors, too"
-        for m, p in across
-        if not p
-    ]
-    return Requires(
-        channels=(STATE, *(groups.loop_of(rig, g.loop).channel for g in of)),
-        sensors=tuple(c for m in groups.zeros(rig) for c in rig.motors[m].currents),
-        machine=periods_of(rig, "machine", groups.zeros(rig)),
-        geometry=periods_of(rig, "geometry", groups.zeros(rig)),
-        capabilities=needed,
-        capture=tuple(dict.fromkeys(c for g in of for c in groups.captured(rig, g))),
-        lacks=tuple(lacks),
-    )
 
 
 def untold(rig: RigFile) -> tuple[Quantity, ...]:

@@ -9,12 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.recording import Recording, Step
+from bench.rigfile.roles import STATE
 from procedures.encoder_zero.groups import ALONG, Group, captured, groups, loop_of
 from procedures.encoder_zero.plan import Plan
 
 Array = npt.NDArray[np.float64]
 STEP = "hold"
-STATE = "state"
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,8 @@ from bench.findings import Effect, Finding
 from bench.rigfile.roles import Status
 from procedures.estimator_compare.estimates import Result
 from procedures.estimator_compare.plan import Plan
-from procedures.estimator_compare.steps import ENGAGE, HANG, Taken
+from procedures.estimator_compare.requires import ENGAGE, HANG
+from procedures.estimator_compare.steps import Taken
 from procedures.one_axis.bank import Array, aligned
 
 OVERLAPPING, FEW, MISMATCH = "overlapping", 4, 1e-4  # which is held against its weights, in so many captures

@@ -17,7 +17,8 @@ from bench.uncertainty import Estimate, Influence
 from bench.uncertainty.estimate import Deviations
 from procedures.estimator_compare import fit
 from procedures.estimator_compare.plan import Plan
-from procedures.estimator_compare.steps import ENGAGE, HANG, Taken, of_kind
+from procedures.estimator_compare.requires import ENGAGE, HANG
+from procedures.estimator_compare.steps import Taken, of_kind
 
 Array = npt.NDArray[np.float64]
 SWITCHED, LOADED = ("velocity_error", "disturbance_error", "y_50_100"), ("peak", "integral", "quiet", "velocity_noise")

@@ -8,7 +8,8 @@ from bench.figures import Figure, Series
 from procedures.estimator_compare import fit
 from procedures.estimator_compare.estimates import Result
 from procedures.estimator_compare.plan import Plan
-from procedures.estimator_compare.steps import ENGAGE, HANG, of_kind
+from procedures.estimator_compare.requires import ENGAGE, HANG
+from procedures.estimator_compare.steps import of_kind
 
 
 def all_figures(result: Result, plan: Plan) -> list[Figure]:

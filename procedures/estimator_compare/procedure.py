@@ -7,6 +7,7 @@ greatest deviation under a load, its integral, the quiet position, the velocity'
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,23 +15,22 @@ from bench.errors import Lacking
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import NOTHING, Load, RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from bench.rigfile.roles import STATUS
-from procedures.estimator_compare import checks, estimates
-from procedures.estimator_compare import figures as drawn
-from procedures.estimator_compare.estimates import Result
 from procedures.estimator_compare.observers import predicted_ratio
 from procedures.estimator_compare.plan import Plan
-from procedures.estimator_compare.steps import ENGAGE, HANG, captured, read_taken
+from procedures.estimator_compare.requires import ENGAGE, HANG, captured, requires
+from procedures.estimator_compare.steps import read_taken
 from procedures.one_axis.bank import RULES, Array, bank
 from procedures.one_axis.conventions import OneAxis, conventions
 from procedures.shared import assumptions
 from procedures.shared.default_masses import nth_lightest
+
+if TYPE_CHECKING:
+    from procedures.estimator_compare.estimates import Result
 
 VELOCITY = Quantity(
     "velocity_error", "1", "RMS of velocity less derivative over the derivative's rms, before the switch"
@@ -119,6 +119,8 @@ def _hang(rig: Rig, plan: Plan, record: Recorder, estimator: str, repeat: int, n
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     """Each quantity by estimator, and their ratios."""
+    from procedures.estimator_compare import checks, estimates
+
     plan, taken, rig = recording.plan, read_taken(recording), recording.rig
     findings.gate(checks.of_signals(taken, plan))
     machine = conventions(rig)
@@ -144,6 +146,8 @@ def measured(result: Result) -> Iterator[Measured]:
 
 def figures(result: Result, recording: Recording[Plan]) -> Iterable[Figure]:
     """Answers to load and switch, velocity error of each repeat."""
+    from procedures.estimator_compare import figures as drawn
+
     return drawn.all_figures(result, recording.plan)
 
 
@@ -161,25 +165,6 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
             yield f"{key}: found {', '.join(chosen)}; expected each once"
     if plan.load not in rig.masses:
         yield f"load: found {plan.load!r}; expected one of the rig's masses: {', '.join(rig.masses)}"
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig's machine has."""
-    machine = conventions(rig)
-    return Requires(
-        roles=("levitation", "operator"),
-        channels=(machine.position, STATUS),
-        capabilities=(
-            "settings.estimator",
-            "settings.compensation",
-            "model.harmonic_hz",
-            "model.degree",
-            "model.window",
-            "model.rule",
-        ),
-        capture=captured(machine, ENGAGE),
-        masses=True,
-    )
 
 
 procedure = Procedure(

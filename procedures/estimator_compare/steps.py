@@ -13,10 +13,10 @@ from bench.errors import AnalysisError
 from bench.recording import Recording, Step
 from bench.rigfile.roles import STATUS, Status
 from procedures.estimator_compare.plan import Plan
-from procedures.one_axis.conventions import HARMONIC, LOAD, VELOCITY, OneAxis, conventions
+from procedures.estimator_compare.requires import ENGAGE, HANG, captured
+from procedures.one_axis.conventions import HARMONIC, LOAD, VELOCITY, conventions
 
 Array = npt.NDArray[np.float64]
-ENGAGE, HANG = "engage", "hang"
 
 
 @dataclass(frozen=True)
@@ -40,11 +40,6 @@ class Taken:
     def where(self) -> str:
         """How it is named to the reader."""
         return f"{self.estimator}, {'switched' if self.kind == ENGAGE else 'loaded'}, {self.repeat + 1}"
-
-
-def captured(machine: OneAxis, kind: str) -> tuple[str, ...]:
-    """What is captured."""
-    return (*machine.captured, *((LOAD, HARMONIC, *machine.currents) if kind == ENGAGE else ()))
 
 
 def read_taken(recording: Recording[Plan]) -> list[Taken]:

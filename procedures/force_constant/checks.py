@@ -17,7 +17,8 @@ from procedures.force_constant import load_at_rest
 from procedures.force_constant.fit import CROSS, DIRECT, FORCE, PAIRS
 from procedures.force_constant.load_at_rest import Cause, Rest
 from procedures.force_constant.plan import Plan
-from procedures.force_constant.steps import AXES, AtLevel, RampData
+from procedures.force_constant.requires import AXES
+from procedures.force_constant.steps import AtLevel, RampData
 from procedures.servomotor import checks as servomotor_checks
 from procedures.servomotor.conventions import Servomotor
 from procedures.shared import signals

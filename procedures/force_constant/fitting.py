@@ -4,33 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from bench.procedure.requires import Requires
 from bench.rigfile import RigFile
-from bench.rigfile.roles import STATUS
 from procedures.force_constant.plan import Plan
-from procedures.force_constant.steps import AXES, channels
-from procedures.servomotor.conventions import conventions
-from procedures.servomotor.parameters import BIASES, needed, parameter
-from procedures.shared.unsupported import of_motors
+from procedures.servomotor.parameters import parameter
 
 # What the levels are checked with before anything starts; no result uses these.
 WEIGHT_N, COM_TO_OUTBOARD = 10.2 * 9.81, 0.010  # T Table 6.1
 SLOPE_N_A, SLOPE_BIAS_A, ALPHA_N_A = 74.4, 3.0, 12.1  # T (6.12), Table 6.2
 ROOM = 0.95  # share of the bias that a control current may take: a coil cannot pull with less than no current
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig's machine has."""
-    machine = conventions(rig)
-    return Requires(
-        lacks=(*machine.lacks, *of_motors(rig)),
-        roles=("levitation", "rotation"),
-        channels=(*channels(machine), STATUS),
-        sensors=(*machine.coils_of(*AXES), *machine.segments),
-        parameters=needed(rig, *BIASES, "motor.ramp", "motor.across", "motor.along"),
-        geometry=("amb_span", "motor_to_outboard_amb", "amb_gap", "motor_stiffness", *machine.levers),
-        machine=("amb_asymmetry", "pole_pairs"),
-    )
 
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -25,19 +26,20 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
-from procedures.force_constant import checks, estimates, first_angle, fit, load_at_rest
-from procedures.force_constant import figures as drawn
-from procedures.force_constant.estimates import AxisResult
+from procedures.force_constant import first_angle, load_at_rest
 from procedures.force_constant.first_angle import CALIBRATION
-from procedures.force_constant.fit import TIME
-from procedures.force_constant.fitting import check, requires
+from procedures.force_constant.fitting import check
 from procedures.force_constant.plan import Plan
-from procedures.force_constant.steps import AtLevel, RampData, channels, read_ramps
+from procedures.force_constant.requires import channels, requires
+from procedures.force_constant.steps import AtLevel, RampData, read_ramps
 from procedures.servomotor.conventions import conventions
 from procedures.servomotor.facts import of_ends
 from procedures.servomotor.parameters import BIASES, CURRENTS, named, write
 from procedures.shared import assumptions, first_look
 from procedures.shared.step_table import record_step
+
+if TYPE_CHECKING:
+    from procedures.force_constant.estimates import AxisResult
 
 Array = npt.NDArray[np.float64]
 
@@ -128,6 +130,8 @@ class Analysis:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     """Both axes with their influences."""
+    from procedures.force_constant import checks, estimates
+
     plan, rig, data = recording.plan, recording.rig, read_ramps(recording)
     facts = of_ends(rig, recording.calibration(CALIBRATION).values)
     first_look.gate(recording, findings, first_angle.judge(data, rig, facts, plan))
@@ -155,6 +159,8 @@ def measured(a: Analysis) -> Iterator[Measured]:
 
 def contradictions(recording: Recording[Plan], a: Analysis) -> Iterator[Finding]:
     """Checks of the fits: the load at rest, wires, rows, levels, drift, axes."""
+    from procedures.force_constant import checks
+
     plan, known = recording.plan, of_ends(recording.rig, recording.calibration(CALIBRATION).values)
     rest = load_at_rest.compared(a.data.vertical, a.inputs, known, recording.rig, a.y.weight, plan.bias_A)
     yield from checks.load_moved(rest, 2 * a.y.mean.u)
@@ -170,6 +176,8 @@ def contradictions(recording: Recording[Plan], a: Analysis) -> Iterator[Finding]
 
 
 def _fits(axis: str, result: AxisResult, a: Analysis, plan: Plan) -> Iterator[Finding]:
+    from procedures.force_constant import checks, estimates, fit
+
     parts, dof = estimates.differences(result), fit.scatter(result.fit)[1]
     hint = estimates.suspect(a.data.vertical, a.inputs, plan.bias_A, result) if axis == "y" else ""
     mean, rows = estimates.mean_of(parts), tuple(e.value for e in result.row_means)
@@ -181,12 +189,17 @@ def _fits(axis: str, result: AxisResult, a: Analysis, plan: Plan) -> Iterator[Fi
 
 def _drift(result: AxisResult) -> tuple[Array, Array]:
     """Drift of both rows in N/s, mean over the angles, with its standard uncertainty."""
+    from procedures.force_constant import fit
+    from procedures.force_constant.fit import TIME
+
     steps, _ = fit.scatter(result.fit)
     spread = np.sqrt((result.fit.solvers[:, TIME] ** 2).sum()) / len(result.fit.solvers)
     return result.fit.terms[:, :, TIME].mean(axis=1), np.sqrt(np.diag(steps)) * spread
 
 
 def _ripple(rig: RigFile, plan: Plan) -> Iterator[Finding]:
+    from procedures.force_constant import fit
+
     pairs = round(rig.machine["pole_pairs"].value)
     if fit.aliased(plan.angles, pairs):
         yield Finding(
@@ -225,6 +238,8 @@ def facts(a: Analysis) -> dict[str, Estimate]:
 
 def figures(a: Analysis, recording: Recording[Plan]) -> Iterable[Figure]:
     """Forces, residuals, constants over the angle, and the budgets."""
+    from procedures.force_constant import figures as drawn
+
     del recording
     return drawn.all_figures(a.data, a.y, a.x, a.alone)
 

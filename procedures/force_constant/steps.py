@@ -11,17 +11,11 @@ import numpy.typing as npt
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from procedures.force_constant.fit import Ramps
-from procedures.servomotor.conventions import Servomotor, conventions, displacement
+from procedures.force_constant.requires import channels
+from procedures.servomotor.conventions import conventions, displacement
 from procedures.shared.step_table import Labels, StepTable, by_angle, tabulate
 
 Array = npt.NDArray[np.float64]
-
-AXES = ("yi", "yo", "xi", "xo")
-
-
-def channels(machine: Servomotor) -> tuple[str, ...]:
-    """What is recorded at a level, besides the flags."""
-    return (*machine.coils_of(*AXES), *machine.segments, *machine.positions_of(*AXES))
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,27 +18,24 @@ from bench.calibration import Need
 from bench.figures import Figure
 from bench.findings import Finding, Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from bench.rigfile.roles import STATUS
 from bench.uncertainty import Estimate
-from procedures.force_coupling import checks as force_coupling_checks
-from procedures.force_coupling import estimates
-from procedures.force_coupling import figures as drawn
-from procedures.force_coupling.estimates import Analysis
 from procedures.force_coupling.plan import Plan
+from procedures.force_coupling.requires import requires
 from procedures.force_coupling.steps import Phase
 from procedures.servomotor import carrying, checks
 from procedures.servomotor.conventions import Servomotor, conventions, radial_currents
-from procedures.servomotor.parameters import needed, stated, write
-from procedures.servomotor.steps import POSITIONS, channels, read_steps
+from procedures.servomotor.parameters import stated, write
+from procedures.servomotor.steps import POSITIONS, read_steps
 from procedures.shared import assumptions, first_look
 from procedures.shared.step_table import StepTable, record_step
-from procedures.shared.unsupported import of_motors
+
+if TYPE_CHECKING:
+    from procedures.force_coupling.estimates import Analysis
 
 RATIO = Quantity(
     "alpha_ratio", "1", "alpha_d/alpha_c, direct over coupled force constant at the home angle", title="α_d/α_c"
@@ -45,7 +43,6 @@ RATIO = Quantity(
 ALPHA_C = Quantity("alpha_c", "N/A", "coupled force constant at the home angle: x force per y current in quadrature")
 GAMMA_0 = Quantity("gamma_0", "rad", "phase angle at which direct and coupled force are apart: zero of the commutation")
 MEASURES = (RATIO, ALPHA_C, GAMMA_0)
-GEOMETRY = ("com_to_inboard_sensor", "com_to_outboard_sensor", "com_to_inboard_amb", "com_to_motor", "motor_stiffness")
 FATAL = (*checks.FATAL, "rotor-off-edge")
 ALPHA_RATIO = 0.85  # T 6.6.3; for predictions before a run, and for nothing that is measured
 STEADY_RAD = (
@@ -95,6 +92,9 @@ def _visit(rig: Rig, plan: Plan, record: Recorder) -> None:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     """The currents over the phase angle with their fit."""
+    from procedures.force_coupling import checks as force_coupling_checks
+    from procedures.force_coupling import estimates
+
     data = read(recording)
     first_look.gate(recording, findings, checks.segments(data.mean, conventions(recording.rig)))
     findings.gate(_of_signals(data, conventions(recording.rig), recording.plan), FATAL)
@@ -164,21 +164,9 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(a: Analysis, recording: Recording[Plan]) -> Iterable[Figure]:
     """Currents over gamma with the model, and residuals."""
+    from procedures.force_coupling import figures as drawn
+
     return drawn.all_figures(a.data, a, recording.rig.machine["pole_pairs"].value)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig's machine has."""
-    machine = conventions(rig)
-    return Requires(
-        lacks=(*machine.lacks, *of_motors(rig)),
-        roles=("levitation", "rotation"),
-        channels=(*channels(machine), STATUS),
-        sensors=(*machine.segments, *machine.positions_of(*POSITIONS)),
-        parameters=needed(rig, *carrying.NEEDED, "motor.phase", "motor.segment_limit"),
-        geometry=GEOMETRY,
-        machine=("pole_pairs",),
-    )
 
 
 procedure = Procedure(

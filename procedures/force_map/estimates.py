@@ -23,8 +23,9 @@ from bench.uncertainty import Estimate
 from procedures.force_map import fit as force_map_fit
 from procedures.force_map import selection as force_map_selection
 from procedures.force_map.fit import FORCE_TERMS, Identifiability, Points
+from procedures.force_map.requires import positions
 from procedures.force_map.selection import Selection
-from procedures.force_map.steps import MapData, positions
+from procedures.force_map.steps import MapData
 from procedures.servomotor.conventions import Servomotor, conventions, displacement, radial_currents, sensor_share
 from procedures.shared import gradients as shared_gradients
 from procedures.shared import leastsquares, type_a

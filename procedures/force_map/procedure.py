@@ -18,26 +18,23 @@ from bench.calibration import Need
 from bench.figures import Figure
 from bench.findings import Effect, Finding, Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import NOTHING, Load, RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from bench.rigfile.roles import STATUS
 from procedures.force_map import estimates, steps
-from procedures.force_map import figures as force_map_figures
 from procedures.force_map.estimates import CROSS, Result
 from procedures.force_map.fit import ABOUT, UNITS
 from procedures.force_map.plan import Plan
-from procedures.force_map.steps import AtPoint, MapData, channels, positions, read_points
+from procedures.force_map.requires import requires
+from procedures.force_map.steps import AtPoint, MapData, read_points
 from procedures.servomotor import carrying, hold, segments, wiring
 from procedures.servomotor.conventions import conventions
 from procedures.servomotor.facts import of_ends
-from procedures.servomotor.parameters import BIASES, named, needed, write
+from procedures.servomotor.parameters import BIASES, named, write
 from procedures.shared import assumptions
 from procedures.shared.step_table import record_step
-from procedures.shared.unsupported import of_motors
 
 CALIBRATION = "amb-calibration"
 SHOWN = ("alpha_1", "alpha_2", "alpha_3", "alpha_4", "alpha_5", "alpha_6", "alpha_8", "alpha_9")
@@ -45,8 +42,6 @@ MEASURES = (
     *(Quantity(name, UNITS[name], ABOUT[name]) for name in SHOWN),
     Quantity(CROSS, "N/A", "vertical force of i_x, mean over an electrical period: the zero of the commutation"),
 )
-NEEDED = ("motor.ramp", *BIASES, "at.xi", "at.yi", "at.xo", "at.yo")
-GEOMETRY = ("amb_span", "motor_to_outboard_amb", "amb_gap", "lever_left", "lever_right")
 K_N_A, STIFFNESS_N_M = 74.4, 242.6e3  # T (6.12) and Table 6.2; for predictions before a run
 LEAST_TORQUE_A = 0.2
 EXCHANGED = 0.3  # cross over direct force; half a degree of encoder zero makes 8 %
@@ -195,23 +190,10 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(found: tuple[MapData, Result], recording: Recording[Plan]) -> Iterable[Figure]:
     """The greatest terms, residuals and selection."""
+    from procedures.force_map import figures as force_map_figures
+
     del recording
     return force_map_figures.rig_figures(*found)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig's machine has."""
-    machine = conventions(rig)
-    return Requires(
-        lacks=(*machine.lacks, *of_motors(rig)),
-        roles=("levitation", "rotation"),
-        channels=(*channels(machine), STATUS, *wiring.channels(machine)),
-        sensors=(*machine.coils["yi"], *machine.segments, *positions(machine)),
-        parameters=needed(rig, *hold.NEEDED, *wiring.NEEDED, *NEEDED),
-        geometry=GEOMETRY,
-        machine=("pole_pairs",),
-        masses=True,
-    )
 
 
 procedure = Procedure(

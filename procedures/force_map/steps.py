@@ -15,6 +15,7 @@ from bench.findings import Effect, Finding
 from bench.recording import Recording, Step
 from bench.rigfile.roles import STATUS
 from procedures.force_map.plan import Plan
+from procedures.force_map.requires import channels
 from procedures.servomotor.conventions import Servomotor, conventions
 from procedures.shared.step_table import Labels, Samples, StepTable, tabulate
 
@@ -24,16 +25,6 @@ WANDER_N = (
 )
 SLIP = 0.1  # of the torque current of a load; friction makes 2 %
 SIGNIFICANT = 6.0  # standard uncertainties
-
-
-def positions(machine: Servomotor) -> tuple[str, ...]:
-    """Where the shaft is, inboard first."""
-    return machine.positions_of("xi", "yi", "xo", "yo")
-
-
-def channels(machine: Servomotor) -> tuple[str, ...]:
-    """What is recorded at a point, besides the flags."""
-    return (*machine.coils["yi"], *positions(machine), *machine.segments)
 
 
 @dataclass(frozen=True)

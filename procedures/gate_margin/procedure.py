@@ -12,15 +12,13 @@ from bench.calibration import Need
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
-from procedures.gate_margin import checks, estimates
-from procedures.gate_margin import figures as drawn
+from procedures.gate_margin import estimates
 from procedures.gate_margin.estimates import Results, weight_of
 from procedures.gate_margin.place import (
     GATE,
@@ -33,11 +31,11 @@ from procedures.gate_margin.place import (
     grid,
     motion,
     planes,
-    radial,
     rate,
 )
 from procedures.gate_margin.plan import Plan
-from procedures.gate_margin.steps import STATE, read_taken, read_trials
+from procedures.gate_margin.requires import requires
+from procedures.gate_margin.steps import read_taken, read_trials
 from procedures.shared import assumptions, planned
 
 MARGIN = Quantity("gate_margin", "m", "gate less the largest radial reading in one of its times, noise included, "
@@ -171,6 +169,8 @@ def _look(rig: Rig, plan: Plan, record: Recorder, number: int, place: Place, gat
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     """The margins."""
+    from procedures.gate_margin import checks
+
     rig, plan, gate = recording.rig, recording.plan, bound_of(recording)
     findings.add(checks.of_trials(read_trials(recording), gate[0], rig, plan))
     taken = read_taken(recording)
@@ -216,21 +216,9 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(found: Results, recording: Recording[Plan]) -> Iterable[Figure]:
     """Largest readings with the gate, their distribution, the catch."""
+    from procedures.gate_margin import figures as drawn
+
     return drawn.all_figures(found, recording.rig)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig has."""
-    if rig.capabilities.motion is None:
-        return Requires(capabilities=("motion",), capture=())
-    at, probes = motion(rig), radial(rig)
-    return Requires(
-        channels=(*probes.values(), at.place_channel, STATE),
-        capabilities=("motion", "motion.gate", "motion.gate_time"),
-        capture=captured(rig),
-        uses=("settings.observer", "hold", "loop_injection"),
-        lacks=() if probes else ("probes: found none across the shaft; expected the radial ones",),
-    )
 
 
 def untold(rig: RigFile) -> tuple[Quantity, ...]:

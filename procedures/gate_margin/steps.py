@@ -9,10 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.recording import Recording, Step
+from bench.rigfile.roles import STATE
 from procedures.gate_margin.place import TRIAL, WINDOWS, Place, captured, limits, radial
 
 Array = npt.NDArray[np.float64]
-STATE = "state"
 
 
 @dataclass(frozen=True)

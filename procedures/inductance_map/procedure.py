@@ -9,12 +9,12 @@ readings; what turns once with the angle.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING
 
 from bench.errors import AnalysisError
 from bench.figures import Shown
 from bench.findings import Effect, Finding, Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.procedure.states import transition
@@ -23,15 +23,17 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.capture import rises
 from bench.rigfile.envelope import Envelope
-from procedures.inductance_map import checks, estimates
-from procedures.inductance_map import figures as drawn
-from procedures.inductance_map.estimates import Result
+from procedures.inductance_map import checks
 from procedures.inductance_map.places import Place, grid
 from procedures.inductance_map.plan import Plan
-from procedures.inductance_map.steps import PLACE, STATE, captured, read_taken
+from procedures.inductance_map.requires import requires
+from procedures.inductance_map.steps import PLACE, captured, read_taken
 from procedures.shared.rates import of_rate
 from procedures.stages import assumptions
-from procedures.stages.stators import POLES, Phase, axis, lacks, phases
+from procedures.stages.stators import Phase, axis, phases
+
+if TYPE_CHECKING:
+    from procedures.inductance_map.estimates import Result
 
 USUAL_HZ = 20e3
 BEFORE_S = 2e-3
@@ -103,6 +105,8 @@ def _pulse(rig: Rig, plan: Plan, place: Place, phase: Phase) -> None:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     """Fluxes of the pulses, and the map that fits them."""
+    from procedures.inductance_map import estimates
+
     rig, plan, taken = recording.rig, recording.plan, read_taken(recording)
     findings.gate(checks.of_signals(taken, rig, plan))
     findings.gate(checks.of_order(taken, rig))
@@ -147,33 +151,9 @@ def _bytes(rig: RigFile, plan: Plan, phase: Phase) -> int:
 
 def figures(result: Result, recording: Recording[Plan]) -> Iterable[Shown]:
     """Inductance, flux, and the controller's parameters."""
+    from procedures.inductance_map import figures as drawn
+
     return drawn.all_figures(result, recording.rig)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig has."""
-    wanted, some = ("positioning", "phase_test"), phases(rig)
-    if rig.capabilities.phase_test is None or rig.capabilities.positioning is None:
-        return Requires(roles=("motion",), capabilities=wanted, capture=())
-    test = rig.capabilities.phase_test
-    missing = [key for key in ("current", "pulse") if not getattr(test, key)]
-    unread = [p.name for p in some if not p.voltage]
-    return Requires(
-        roles=("motion", "operator"),
-        channels=(STATE, *(a.channel for a in (axis(rig, "stroke"), axis(rig, "angle")) if a is not None),
-                  *(p.current for p in some)),
-        sensors=tuple(c for p in some for c in (p.current, p.voltage) if c),
-        machine=(POLES,),
-        capabilities=wanted,
-        capture=tuple(c for p in some for c in (p.current, p.voltage) if c),
-        lacks=(*lacks(rig, 2), *(f"capabilities.phase_test: found no {key}" for key in missing), *(_six(some)),
-               *((f"capabilities.phase_test.voltages: found none of {', '.join(unread)}",) if unread else ())),
-        uses=("model",),
-    )  # fmt: skip
-
-
-def _six(some: tuple[Phase, ...]) -> tuple[str, ...]:
-    return () if len(some) == 6 else (f"capabilities.phase_test.phases: found {len(some)} of known motors; expected 6",)
 
 
 def holds_for(_: Plan) -> Mapping[str, float]:

@@ -9,13 +9,14 @@ import numpy as np
 
 from bench.recording import Recording, Step
 from bench.rigfile import RigFile
+from bench.rigfile.roles import STATE
 from procedures.inductance_map.model import Rows
 from procedures.inductance_map.places import Place, grid
 from procedures.inductance_map.plan import Plan
 from procedures.inductance_map.pulses import Array, Pulse, read
 from procedures.stages.stators import Phase, axis, phases, poles
 
-PLACE, STATE = "place", "state"
+PLACE = "place"
 
 
 @dataclass(frozen=True)

@@ -9,30 +9,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING
 
 from bench.calibration import Need
 from bench.errors import AnalysisError, Lacking
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.procedure.states import transition
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from bench.rigfile.roles import STATUS
-from procedures.lift_off import checks, estimates
-from procedures.lift_off import figures as drawn
-from procedures.lift_off.estimates import Analysis
 from procedures.lift_off.plan import Plan
-from procedures.lift_off.steps import Dwell, Held, Ramp, Rest, always, channels, read_table
+from procedures.lift_off.requires import requires
+from procedures.lift_off.steps import Dwell, Held, Ramp, Rest, always, read_table
 from procedures.servomotor.conventions import conventions
-from procedures.servomotor.parameters import named, needed, parameter, stated, write
+from procedures.servomotor.parameters import named, parameter, stated, write
 from procedures.shared import assumptions
 from procedures.shared.first_look import watched
 from procedures.shared.step_table import record_step
+
+if TYPE_CHECKING:
+    from procedures.lift_off.estimates import Analysis
 
 GAMMA_LIFT = Quantity(
     "gamma_lift",
@@ -56,9 +56,6 @@ REST_DEPTH = Quantity(
     "rest_depth", "m", "how deep the outboard end lies on its ring, under the probe's zero", title="depth at rest"
 )
 MEASURES = (GAMMA_LIFT, PREDICTED, GAMMA_ZERO, REST_DEPTH)
-GEOMETRY = ("clearance", "com_to_inboard_amb", "com_to_inboard_sensor", "com_to_motor", "com_to_outboard_amb",
-            "com_to_outboard_sensor", "motor_to_outboard_amb")  # fmt: skip
-NEEDED = ("motor.phase", "motor.phase_slew", "motor.segment_limit")
 CHOSEN = (("lifted_by", "motor"), ("sharing", "priority"))
 LONGEST_S = 55.0  # of a lift: the controller's own patience is 60 s
 LOOK_S = 0.05
@@ -152,6 +149,8 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     Raises:
         AnalysisError: there is no step at rest.
     """
+    from procedures.lift_off import checks, estimates
+
     rig, plan, machine = recording.rig, recording.plan, conventions(recording.rig)
     rest = read_table(recording, Rest)
     if rest is None:
@@ -190,22 +189,9 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(a: Analysis, recording: Recording[Plan]) -> Iterable[Figure]:
     """Position and contact over gamma, currents over gamma."""
+    from procedures.lift_off import figures as drawn
+
     return drawn.all_figures(a)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig's machine has."""
-    machine = conventions(rig)
-    return Requires(
-        lacks=machine.lacks,
-        roles=("levitation", "rotation"),
-        channels=(*channels(machine), STATUS),
-        sensors=(*machine.segments, *machine.positions_of("yi", "yo", "xi", "xo")),
-        parameters=needed(rig, *NEEDED),
-        geometry=GEOMETRY,
-        machine=("pole_pairs",),
-        capabilities=("lift_time", "settings.lifted_by", "settings.sharing", f"status.contact.{machine.bearings[1]}"),
-    )
 
 
 procedure = Procedure(

@@ -13,9 +13,9 @@ from bench.errors import AnalysisError
 from bench.recording import Recording, Step
 from bench.rigfile.roles import ANGLE, STATUS
 from procedures.lift_off.plan import Plan
-from procedures.servomotor.conventions import Servomotor, conventions, radial_currents
+from procedures.lift_off.requires import channels
+from procedures.servomotor.conventions import conventions, radial_currents
 from procedures.servomotor.parameters import parameter
-from procedures.servomotor.steps import POSITIONS
 from procedures.shared.step_table import Kind, Labels, StepTable, tabulate
 
 Array = npt.NDArray[np.float64]
@@ -91,11 +91,6 @@ class Ramped:
         then, and is no longer pressed."""
         use = (self.t > self.t[lifted] - early_s[0]) & (self.t < self.t[lifted] - early_s[1])
         return {axis: float(x[use].mean()) for axis, x in self.positions.items()}
-
-
-def channels(machine: Servomotor) -> tuple[str, ...]:
-    """What is read of every step."""
-    return (*machine.positions_of(*POSITIONS), *machine.segments, ANGLE)
 
 
 def read_table(recording: Recording[Any], kind: type[Kind]) -> StepTable[Kind] | None:

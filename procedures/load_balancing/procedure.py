@@ -15,24 +15,22 @@ from bench.calibration import Need
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.procedure.states import transition
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from procedures.load_balancing import checks, estimates, inputs
-from procedures.load_balancing import figures as drawn
+from procedures.load_balancing import estimates, inputs
 from procedures.load_balancing.estimates import FACTS_SEEN, LOADS_SEEN, Result
 from procedures.load_balancing.plan import Plan
-from procedures.load_balancing.steps import AFTER, BEFORE, STEP, channels, positions, read_around
+from procedures.load_balancing.requires import requires
+from procedures.load_balancing.steps import AFTER, BEFORE, STEP, read_around
 from procedures.servomotor import carrying, hold, segments, wiring
 from procedures.servomotor.conventions import LOADS, PHASE, conventions
 from procedures.servomotor.direction import of_probe
-from procedures.servomotor.parameters import chosen, named, needed, stated, write
+from procedures.servomotor.parameters import chosen, named, stated, write
 from procedures.shared import assumptions
-from procedures.shared.unsupported import of_motors
 
 PEAK_Y = Quantity("peak_i_y", "A", "largest |i_y| around the circle, true current", title="largest i_y")
 PEAK_ANY = Quantity(
@@ -54,8 +52,6 @@ ERROR = Quantity(
 MEASURES = (PEAK_Y, PEAK_ANY, REDUCTION, PREDICTED, UNBALANCE, RATIO, GAMMA, ERROR)
 CIRCLE_M_S = 1e-4  # how fast the controller changes the circle's radius
 RATE_HZ = 1000.0  # of the capture
-NEEDED = ("motor.share", "motor.share_slew", "motor.segment_limit", "motor.ramp", "motor.phase", "motor.phase_slew",
-          "motor.phase_limit", "motor.circle", "motor.circle_hz", "angle.ref")  # fmt: skip
 REVERSED = math.pi / 2  # electrical: beyond it the motor's torque is reversed
 KEPT = math.radians(
     10
@@ -136,6 +132,8 @@ class Analysis:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     """Currents by the phase of the circle, and what was predicted of them."""
+    from procedures.load_balancing import checks
+
     findings.gate([*of_probe(recording), *segments.of_nudges(recording)])
     plan, rig = recording.plan, recording.rig
     around = read_around(recording)
@@ -199,25 +197,9 @@ def _phase(rig: RigFile, plan: Plan) -> Iterator[str]:
 
 def figures(a: Analysis, recording: Recording[Plan]) -> Iterable[Figure]:
     """Loads as vectors, currents, phase angle and path around the circle."""
+    from procedures.load_balancing import figures as drawn
+
     return drawn.all_figures(a.by_way, recording.plan)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig's machine has."""
-    machine = conventions(rig)
-    return Requires(
-        lacks=(*machine.lacks, *of_motors(rig)),
-        roles=("levitation", "rotation"),
-        channels=(*channels(machine), *wiring.channels(machine)),
-        sensors=(*machine.segments, *positions(machine)),
-        parameters=needed(rig, *hold.NEEDED, *wiring.NEEDED, *NEEDED),
-        geometry=(*inputs.LENGTHS.values(), "motor_stiffness"),
-        machine=("pole_pairs",),
-        capture=(PHASE, *LOADS),
-        capabilities=(
-            "settings.sharing", "settings.load_balancing", "model.alpha_d", "model.alpha_c", "model.stiffness",
-        ),
-    )  # fmt: skip
 
 
 procedure = Procedure(

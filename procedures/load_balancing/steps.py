@@ -13,7 +13,8 @@ from bench.errors import AnalysisError
 from bench.recording import Recording, Step
 from bench.rigfile.roles import ANGLE, STATUS
 from procedures.load_balancing.plan import Plan
-from procedures.servomotor.conventions import LOADS, PHASE, Servomotor, conventions
+from procedures.load_balancing.requires import channels, positions
+from procedures.servomotor.conventions import LOADS, PHASE, conventions
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -53,16 +54,6 @@ class Around:
         """The sign of i_x while i_y lifts."""
         i = mean_currents(self.segments.reshape(-1, 4))
         return 1 if float((i.real * i.imag).mean()) > 0 else -1
-
-
-def positions(machine: Servomotor) -> tuple[str, ...]:
-    """Where the end is that goes around."""
-    return machine.positions_of("xo", "yo")
-
-
-def channels(machine: Servomotor) -> tuple[str, ...]:
-    """What is recorded of a turn."""
-    return (*positions(machine), *machine.segments, ANGLE, STATUS)
 
 
 def mean_currents(segments: Array) -> Complex:

@@ -15,21 +15,20 @@ from bench.errors import AnalysisError
 from bench.figures import Shown
 from bench.findings import Effect, Finding, Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
-from procedures.load_response import checks, estimates
-from procedures.load_response import figures as drawn
+from procedures.load_response import estimates
 from procedures.load_response.estimates import BAND, COMPLIANCE, FRICTION, LEFT, PEAK, SCALE, Result
 from procedures.load_response.moves import approaches, disturbances, integrators
 from procedures.load_response.plan import Plan
+from procedures.load_response.requires import requires
 from procedures.load_response.sequence import INTEGRATORS, chosen, lead, masses
 from procedures.load_response.sequence import step_count as counted
-from procedures.load_response.steps import STATE, Change, read_changes, read_rests
+from procedures.load_response.steps import Change, read_changes, read_rests
 from procedures.shared.default_masses import by_weight
 from procedures.stages import assumptions
 from procedures.stages.known_loads import loaded, sources
@@ -53,10 +52,6 @@ AFTER = (
     Quantity("peak_angle", "rad", FAR, title="peak deviation around"),
     Quantity(LEFT, "m", REST, title="error after"),
     Quantity("error_after_angle", "rad", REST, title="error after, around"),
-)
-NO_LOADS = (
-    "hooks, levers: found none that load an axis both ways; expected hooks along the shaft to both ends, or levers on both "
-    "sides"
 )
 MEASURES = (*STATIC, *AFTER)
 
@@ -89,6 +84,8 @@ class Evaluated:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Evaluated:
     """Everything."""
+    from procedures.load_response import checks
+
     rig, plan = recording.rig, recording.plan
     try:
         rests, found = read_rests(recording), read_changes(recording)
@@ -128,29 +125,10 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(found: Evaluated, recording: Recording[Plan]) -> Iterable[Shown]:
     """Deviation over load, deviation over time."""
+    from procedures.load_response import figures as drawn
+
     del recording
     return drawn.all_figures(found.result, found.changes, found.plan)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig has."""
-    axes, wanted = loaded(rig), ("positioning", f"settings.{INTEGRATORS}")
-    if rig.capabilities.positioning is None:
-        return Requires(roles=("motion", "operator"), capabilities=wanted)
-    lacks = [] if axes else [NO_LOADS]
-    for axis in axes:
-        bound = {"rate": axis.rate, "stiffness": axis.stiffness, "reference": axis.reference, "asked": axis.asked}
-        if missing := [key for key, name in bound.items() if not name]:
-            lacks.append(f"capabilities.positioning.axes.{axis.name}: found no {', '.join(missing)}")
-    named = [c for a in axes for c in (a.channel, a.reference, a.asked, a.given) if c]
-    return Requires(
-        roles=("motion", "operator"),
-        channels=(*dict.fromkeys(named), STATE),
-        parameters=tuple(p for a in axes for p in (a.target, a.rate, a.stiffness, a.limit) if p),
-        capabilities=wanted,
-        masses=True,
-        lacks=tuple(lacks),
-    )
 
 
 def untold(rig: RigFile) -> tuple[Quantity, ...]:

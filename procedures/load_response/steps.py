@@ -10,13 +10,13 @@ import numpy.typing as npt
 
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
+from bench.rigfile.roles import STATE
 from bench.rigfile.stage import StageAxis, axes_of
 from procedures.load_response.moves import APPROACH, DISTURBED
 from procedures.load_response.plan import Plan
 from procedures.load_response.sequence import count
 
 Array = npt.NDArray[np.float64]
-STATE = "state"
 AT_LIMIT = 0.98  # of the greatest force: from here on it is at its limit
 FEWEST = 20  # samples of a step
 

@@ -9,21 +9,19 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import count
+from typing import TYPE_CHECKING
 
 from bench.errors import AnalysisError
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
-from procedures.loop_response import checks, estimates, grid
-from procedures.loop_response import figures as drawn
-from procedures.loop_response.estimates import Result
+from procedures.loop_response import grid
 from procedures.loop_response.fit import TOP_DEGREE
 from procedures.loop_response.injection import (
     BELOW,
@@ -39,9 +37,13 @@ from procedures.loop_response.injection import (
     sine,
 )
 from procedures.loop_response.plan import Plan
-from procedures.loop_response.steps import REFINED, STATE, STEP, SURVEY, line_of, read_taken
+from procedures.loop_response.requires import requires
+from procedures.loop_response.steps import REFINED, STEP, SURVEY, line_of, read_taken
 from procedures.shared import assumptions, planned
 from procedures.shared.rates import of_rate
+
+if TYPE_CHECKING:
+    from procedures.loop_response.estimates import Result
 
 BANDWIDTH = Quantity(
     "bandwidth", "Hz", "where |y/r| of a loop falls to -3 dB, reference and rate injected, all others closed"
@@ -154,6 +156,8 @@ def _sensor(look: _Look) -> None:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> list[Result]:
     """Bandwidth and sensitivity of each loop."""
+    from procedures.loop_response import checks, estimates
+
     taken = read_taken(recording)
     findings.gate(checks.of_signals(taken, recording.rig, recording.plan))
     results, failed = estimates.results(taken, recording.rig, recording.plan)
@@ -199,22 +203,10 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(results: Sequence[Result], recording: Recording[Plan]) -> Iterable[Figure]:
     """|y/r| of all loops with their -3 dB, and |S| over its zones."""
+    from procedures.loop_response import figures as drawn
+
     del recording
     return drawn.all_figures(results)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig has."""
-    can = rig.capabilities.loop_injection
-    if can is None:
-        return Requires(capabilities=("loop_injection",), capture=())
-    shown = tuple(dict.fromkeys(loop.channel for loop in can.loops.values()))
-    return Requires(
-        channels=(*shown, STATE),
-        capabilities=("loop_injection",),
-        capture=(*shown, *([can.wave] if can.wave else [])),
-        lacks=() if REFERENCE in can.places else ("capabilities.loop_injection.places: found no reference",),
-    )
 
 
 def untold(rig: RigFile) -> tuple[Quantity, ...]:

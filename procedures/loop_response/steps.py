@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.recording import Recording
+from bench.rigfile.roles import STATE
 from procedures.loop_response import fit
 from procedures.loop_response.fit import Line
 from procedures.loop_response.injection import SENSOR, ability
@@ -17,7 +18,6 @@ from procedures.loop_response.injection import SENSOR, ability
 Array = npt.NDArray[np.float64]
 STEP = "sine"
 SURVEY, REFINED = "survey", "refined"
-STATE = "state"
 LIMITED = 0.02  # share of a line's samples of telemetry that may say so, and it is still a sine
 
 

@@ -7,11 +7,11 @@ what both sides differ by at the greatest current.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.procedure.states import transition
@@ -19,14 +19,15 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
-from procedures.map_zero import checks, estimates
-from procedures.map_zero import figures as drawn
 from procedures.map_zero.approaches import Approach, approaches, ramp
-from procedures.map_zero.estimates import Stator
 from procedures.map_zero.plan import Plan
-from procedures.map_zero.steps import LEVEL, STATE, read_rests
+from procedures.map_zero.requires import requires
+from procedures.map_zero.steps import LEVEL, read_rests
 from procedures.stages import assumptions
-from procedures.stages.stators import POLES, axis, lacks, phases
+from procedures.stages.stators import axis
+
+if TYPE_CHECKING:
+    from procedures.map_zero.estimates import Stator
 
 ZERO = Quantity(
     "zero", "rad", "what the encoder reads where the first phase of a stator is aligned, mean over the turn"
@@ -85,6 +86,8 @@ def _drawn(rig: Rig, plan: Plan, record: Recorder, approach: Approach) -> None:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> list[Stator]:
     """Where phases draw the shaft, and the zeros of stators by it."""
+    from procedures.map_zero import checks, estimates
+
     rig, plan, rests = recording.rig, recording.plan, read_rests(recording)
     findings.gate(checks.of_signals(rests, rig, plan))
     findings.gate(checks.of_order(rests, rig, plan))
@@ -116,23 +119,10 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(found: Sequence[Stator], recording: Recording[Plan]) -> Iterable[Figure]:
     """Alignments and levels."""
+    from procedures.map_zero import figures as drawn
+
     del recording
     return drawn.all_figures(found)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig has."""
-    wanted, test = ("positioning", "phase_test"), rig.capabilities.phase_test
-    if test is None or rig.capabilities.positioning is None:
-        return Requires(roles=("motion",), capabilities=wanted)
-    return Requires(
-        roles=("motion", "operator"),
-        channels=(STATE, *(a.channel for a in (axis(rig, "stroke"), axis(rig, "angle")) if a is not None),
-                  *(p.current for p in phases(rig))),
-        machine=(POLES,),
-        capabilities=wanted,
-        lacks=(*lacks(rig), *(() if test.current else ("capabilities.phase_test: found no current",))),
-    )  # fmt: skip
 
 
 def holds_for(_: Plan) -> Mapping[str, float]:

@@ -8,12 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.recording import Recording, Step
+from bench.rigfile.roles import STATE
 from procedures.map_zero.approaches import Approach, approaches
 from procedures.map_zero.plan import Plan
 from procedures.stages.stators import axis
 
 Array = npt.NDArray[np.float64]
-LEVEL, STATE = "level", "state"
+LEVEL = "level"
 
 
 @dataclass(frozen=True)

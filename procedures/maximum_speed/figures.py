@@ -16,7 +16,8 @@ from bench.units import RPM
 from procedures.maximum_speed import fit
 from procedures.maximum_speed.estimates import Result
 from procedures.maximum_speed.plan import HALF, OP, Plan
-from procedures.maximum_speed.steps import DEMANDS, RUN, SHARED
+from procedures.maximum_speed.requires import DEMANDS
+from procedures.maximum_speed.steps import RUN, SHARED
 from procedures.servomotor.conventions import conventions
 
 Array = npt.NDArray[np.float64]

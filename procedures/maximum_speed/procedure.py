@@ -8,28 +8,30 @@ taken in the same state of the AMBs, make of the torque currents that were recor
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING
 
 from bench.calibration import Calibration, Need
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from procedures.maximum_speed import checks, estimates, foresight
-from procedures.maximum_speed import figures as drawn
-from procedures.maximum_speed.estimates import Result
+from procedures.maximum_speed import foresight
 from procedures.maximum_speed.plan import OP, SHARINGS, Plan
+from procedures.maximum_speed.requires import requires
 from procedures.maximum_speed.running import carry_so_much, guard_of, limit_of, run_all
-from procedures.maximum_speed.steps import captured, channels, coils, read_windows
+from procedures.maximum_speed.steps import read_windows
 from procedures.servomotor import carrying, hold, segments, wiring
 from procedures.servomotor.conventions import conventions
 from procedures.servomotor.direction import of_probe
-from procedures.servomotor.parameters import BIASES, chosen, named, needed, stated, write
+from procedures.servomotor.parameters import BIASES, chosen, named, stated, write
 from procedures.shared import assumptions
+
+if TYPE_CHECKING:
+    from procedures.maximum_speed.estimates import Result
 
 SPEED_HALF = Quantity(
     "speed_half",
@@ -65,7 +67,6 @@ SD = Quantity(
 )
 SINGLES = (SPEED_HALF, SPEED_OP, RATIO, RATIO_PREDICTED, PREDICTED_HALF, PREDICTED_OP, SLOPE)
 MEASURES = (*SINGLES, SD)
-NEEDED = ("motor.share", "motor.share_slew", "motor.segment_limit", "motor.ramp", "motor.ref_along", "angle.speed")
 WORDS = {"half": "λ = 1/2", "op": "λ by (6.24)"}
 
 
@@ -111,6 +112,8 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     """Speeds, ratio, and what is expected of them."""
+    from procedures.maximum_speed import checks, estimates
+
     findings.gate([*of_probe(recording), *segments.of_nudges(recording), *checks.of_events(recording)])
     plan, rig = recording.plan, recording.rig
     limit, machine = limit_of(rig, plan), conventions(rig)
@@ -157,23 +160,9 @@ def foresees(rig: RigFile, plan: Plan, facts: Mapping[str, Calibration]) -> Iter
 
 def figures(result: Result, recording: Recording[Plan]) -> Iterable[Figure]:
     """Speed over time, torque over speed, currents and bound within a turn."""
+    from procedures.maximum_speed import figures as drawn
+
     return drawn.all_figures(result, recording, limit_of(recording.rig, recording.plan))
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig's machine has."""
-    machine = conventions(rig)
-    return Requires(
-        lacks=machine.lacks,
-        roles=("levitation", "rotation"),
-        channels=(*channels(machine), *wiring.channels(machine)),
-        sensors=(*machine.segments, *coils(machine)),
-        parameters=needed(rig, *hold.NEEDED, *wiring.NEEDED, *BIASES, *NEEDED),
-        capabilities=("settings.sharing", "settings.torque", "settings.commutation"),
-        capture=captured(machine),
-        machine=("pole_pairs", "segment_gain", "torque_ripple"),
-        geometry=("motor_stiffness", "com_to_inboard_amb", "com_to_motor", "com_to_outboard_sensor"),
-    )
 
 
 procedure = Procedure(

@@ -11,7 +11,8 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.roles import SPEED, told_in
 from procedures.maximum_speed.plan import HALF, OP, Plan
-from procedures.maximum_speed.steps import CARRIED_A, GUARDED, NOT_CARRIED, RUN, SET_POINT, SHARED, UNSTEADY, captured
+from procedures.maximum_speed.requires import captured
+from procedures.maximum_speed.steps import CARRIED_A, GUARDED, NOT_CARRIED, RUN, SET_POINT, SHARED, UNSTEADY
 from procedures.servomotor import carrying
 from procedures.servomotor.conventions import conventions
 from procedures.servomotor.parameters import chosen, stated, write

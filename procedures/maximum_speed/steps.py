@@ -11,10 +11,11 @@ import numpy.typing as npt
 
 from bench.errors import AnalysisError
 from bench.recording import Captured, Recording, Step
-from bench.rigfile.roles import ANGLE, SPEED, STATUS
+from bench.rigfile.roles import ANGLE, STATUS
 from procedures.maximum_speed import fit
 from procedures.maximum_speed.fit import Turning
 from procedures.maximum_speed.plan import HALF, OP, Plan
+from procedures.maximum_speed.requires import ACROSS, BOUND, DEMANDS, GIVEN, SHARE, TURNED, _of_law, channels, coils
 from procedures.servomotor.conventions import Servomotor, conventions
 
 Array = npt.NDArray[np.float64]
@@ -24,30 +25,7 @@ GUARDED, UNSTEADY, NOT_CARRIED, SET_POINT = "guarded", "unsteady", "not-carried"
 SHARED = "sharing"  # event: the segments are shared another way from now on
 """Events: the rotor reached the speed that guards the run; its speed did not become steady; no set point makes the motor carry
 what was asked for; where it holds its end."""
-TURNED, DEMANDS, GIVEN, BOUND, SHARE = "angle", ("demand_x", "demand_y"), "torque_given", "torque_bound", "lambda"
-ACROSS = ("i_d1", "i_d2", "i_d3", "i_d4")
-"""What a capture of the controller calls the angle, what its law asks for, gives and allows, and the segments' currents
-across the field."""
 AT_BOUND_A = 1e-3  # of the bound, and what is given is all there is
-
-
-def coils(machine: Servomotor) -> tuple[str, ...]:
-    """The radial AMBs' currents."""
-    return machine.coils_of("xi", "yi", "xo", "yo")
-
-
-def channels(machine: Servomotor) -> tuple[str, ...]:
-    """What is read of a window."""
-    return (ANGLE, SPEED, STATUS, *machine.segments, *coils(machine))
-
-
-def captured(machine: Servomotor) -> tuple[str, ...]:
-    """What is captured in it."""
-    return (TURNED, *_of_law(machine))
-
-
-def _of_law(machine: Servomotor) -> tuple[str, ...]:
-    return (*DEMANDS, GIVEN, BOUND, SHARE, *machine.segments, *ACROSS)
 
 
 @dataclass(frozen=True)

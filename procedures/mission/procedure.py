@@ -11,23 +11,24 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 from bench.errors import DeviceFault, InterlockError
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from procedures.mission import checks, estimates
-from procedures.mission import figures as drawn
-from procedures.mission.estimates import Told
 from procedures.mission.plan import Plan
-from procedures.mission.steps import LIFT, MOVE, TURN, Flight, captured, motion, radial, read
+from procedures.mission.requires import motion, radial, requires
+from procedures.mission.steps import LIFT, MOVE, TURN, Flight, captured, read
 from procedures.shared import assumptions, planned
+
+if TYPE_CHECKING:
+    from procedures.mission.estimates import Told
 
 PEAK = Quantity("peak_reading", "m", "largest distance from the probe's zero during the moves, without noise")
 SWING = Quantity("swing", "m", "peak to peak during a repeat, there and back, without noise")
@@ -138,6 +139,8 @@ class Results:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     """Whether it flew, and the numbers."""
+    from procedures.mission import checks, estimates
+
     flight, rig, plan = read(recording), recording.rig, recording.plan
     findings.gate(checks.of_flight(flight, rig, plan))
     told = estimates.of_flight(flight, rig, plan)
@@ -185,23 +188,9 @@ def _memory(rig: RigFile, plan: Plan) -> Iterator[str]:
 
 def figures(results: Results, recording: Recording[Plan]) -> Iterable[Figure]:
     """Readings with the gate, place and angle, the bearings' currents."""
+    from procedures.mission import figures as drawn
+
     return drawn.all_figures(results.flight, results.told, recording.rig, results.plan)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig's machine has."""
-    if rig.capabilities.motion is None:
-        return Requires(capabilities=("motion", "settings.observer"))
-    at = motion(rig)
-    probes = radial(rig)
-    lacks = () if probes else ("probes: found none across the shaft; expected the radial ones",)
-    return Requires(
-        channels=(*probes.values(), at.place_channel, at.angle_channel),
-        sensors=(*probes.values(), at.place_channel),
-        capture=(*probes.values(), at.place_channel, at.angle_channel, *at.currents),
-        capabilities=("motion", "settings.observer", "motion.gate", "motion.gate_time"),
-        lacks=lacks,
-    )
 
 
 procedure = Procedure(

@@ -8,33 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from bench.errors import Lacking
 from bench.recording import Recording
 from bench.rigfile import RigFile
-from bench.rigfile.capabilities_of_loops import Motion
+from bench.rigfile.roles import STATE
 from procedures.mission.plan import Plan
+from procedures.mission.requires import motion, radial
 
 Array = npt.NDArray[np.float64]
 TURN, LIFT, MOVE = "turn", "lift", "move"
 PLACES = 2
-STATE = "state"
-
-
-def motion(rig: RigFile) -> Motion:
-    """How the mover is sent.
-
-    Raises:
-        Lacking: the rig file does not say.
-    """
-    found = rig.capabilities.motion
-    if found is None:
-        raise Lacking("capabilities: found no motion")
-    return found
-
-
-def radial(rig: RigFile) -> dict[str, str]:
-    """Channels of the probes that look across the shaft, by the probes' names."""
-    return {name: probe.channel for name, probe in rig.probes.items() if probe.direction is not None}
 
 
 def captured(rig: RigFile, plan: Plan) -> tuple[str, ...]:

@@ -8,6 +8,7 @@ way: the AMBs hold, the motor has no current, and the AMB's own stiffness is tol
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -16,27 +17,24 @@ from bench.calibration import Need
 from bench.figures import Figure
 from bench.findings import Finding, Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.procedure.states import transition
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from bench.rigfile.roles import STATUS
-from procedures.negative_stiffness import checks as negative_stiffness_checks
-from procedures.negative_stiffness import estimates
-from procedures.negative_stiffness import figures as drawn
-from procedures.negative_stiffness.estimates import Analysis
 from procedures.negative_stiffness.plan import Plan
+from procedures.negative_stiffness.requires import requires
 from procedures.negative_stiffness.steps import Displaced, HeldByAmbs, HeldByMotor
 from procedures.servomotor import carrying, checks
 from procedures.servomotor.conventions import conventions, radial_currents
 from procedures.servomotor.parameters import BIASES, named, needed, stated, write
-from procedures.servomotor.steps import POSITIONS, channels, read_steps
+from procedures.servomotor.steps import POSITIONS, read_steps
 from procedures.shared import first_look
 from procedures.shared.step_table import StepTable, record_step
-from procedures.shared.unsupported import of_motors
+
+if TYPE_CHECKING:
+    from procedures.negative_stiffness.estimates import Analysis
 
 Array = npt.NDArray[np.float64]
 ALPHA_X = Quantity(
@@ -51,8 +49,6 @@ ALPHA_X_AMB = Quantity(
 MEASURES = (ALPHA_X, ALPHA_X_AMB)
 MARGIN = carrying.MARGIN
 AMB_N_PER_A = 74.4  # T (6.12), K_o; for predictions before a run, and for nothing that is measured
-GEOMETRY = ("com_to_inboard_sensor", "com_to_outboard_sensor", "com_to_inboard_amb", "com_to_outboard_amb", "com_to_motor",
-            "motor_to_outboard_amb", "amb_span", "amb_gap", "motor_stiffness")  # fmt: skip
 
 
 def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
@@ -136,6 +132,9 @@ def _tilt(rig: RigFile) -> float:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     """The stiffness both ways, by the motor's current and by the AMB's."""
+    from procedures.negative_stiffness import checks as negative_stiffness_checks
+    from procedures.negative_stiffness import estimates
+
     first_look.gate(recording, findings, _of_first(recording))
     motor, ambs = read(recording)
     findings.gate(_of_signals(recording, motor, ambs), checks.FATAL)
@@ -231,21 +230,9 @@ def _ranges(rig: RigFile, plan: Plan, furthest: float) -> Iterator[str]:
 
 def figures(a: Analysis, recording: Recording[Plan]) -> Iterable[Figure]:
     """Force over displacement with residuals, and the AMB's lines at both biases."""
+    from procedures.negative_stiffness import figures as drawn
+
     return drawn.all_figures(a, conventions(recording.rig), recording.plan)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig's machine has."""
-    machine = conventions(rig)
-    return Requires(
-        lacks=(*machine.lacks, *of_motors(rig)),
-        roles=("levitation", "rotation"),
-        channels=(*channels(machine), STATUS),
-        sensors=(*machine.segments, *machine.coils["yo"], *machine.positions_of(*POSITIONS)),
-        parameters=needed(rig, *carrying.NEEDED, "at.yo", *BIASES, "motor.segment_limit"),
-        geometry=GEOMETRY,
-        machine=("pole_pairs",),
-    )
 
 
 procedure = Procedure(

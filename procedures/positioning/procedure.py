@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import count
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bench.figures import Shown
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
@@ -23,15 +23,16 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
 from bench.rigfile.stage import axes_of
-from procedures.positioning import checks, estimates
-from procedures.positioning import figures as drawn
-from procedures.positioning.estimates import Result
 from procedures.positioning.plan import Plan
+from procedures.positioning.requires import COUNTER, readable, requires
 from procedures.positioning.standard import FIGURES
-from procedures.positioning.steps import READ, READING, REST, STATE, read_taken
+from procedures.positioning.steps import READ, READING, REST, read_taken
 from procedures.positioning.targets import UP, Approach, cycle, fewest
-from procedures.positioning.way import Tested, rates, readable, tested
+from procedures.positioning.way import Tested, rates, tested
 from procedures.stages import assumptions
+
+if TYPE_CHECKING:
+    from procedures.positioning.estimates import Result
 
 WORDS = {
     "A": ("bidirectional accuracy", "from the lowest mean - 2 s to the highest mean + 2 s, both ways"),
@@ -52,8 +53,6 @@ AROUND = tuple(
     Quantity(f"{n}_angle", "rad", f"{WORDS[n][1]} (ISO 230-2)", title=f"{WORDS[n][0]} around") for n in FIGURES
 )
 MEASURES = (*ALONG, *AROUND)
-COUNTER = "without one outside the loop only the repeatability of a counter could be told, and that is no accuracy"
-NONE = f"capabilities.reference: found no reference instrument of an axis; {COUNTER}"
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
@@ -99,6 +98,8 @@ def _read(rig: Rig, plan: Plan, record: Recorder, one: Tested, approach: Approac
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> list[Result]:
     """The figures of each axis."""
+    from procedures.positioning import checks, estimates
+
     taken = read_taken(recording)
     findings.gate(checks.of_signals(taken, recording.rig, recording.plan))
     findings.add(checks.of_axes(taken, recording))
@@ -135,20 +136,6 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
         yield f"rest_s: found {plan.rest_s:g} s; expected no more than dwell_s, {plan.dwell_s:g} s"
 
 
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig has."""
-    if rig.capabilities.positioning is None:
-        return Requires(roles=("motion",), capabilities=("positioning",))
-    some = readable(rig)
-    asked = any(not rig.capabilities.reference[name].channel for name in some)
-    return Requires(
-        roles=("motion", "operator") if asked else ("motion",),
-        channels=(STATE, *(axis.channel for axis in some.values())),
-        capabilities=("positioning", "reference") if some else ("positioning",),
-        lacks=() if some else (NONE,),
-    )
-
-
 def untold(rig: RigFile) -> tuple[Quantity, ...]:
     """Of axes along and around, those that no instrument reads."""
     units = {axis.unit for axis in readable(rig).values()}
@@ -172,6 +159,8 @@ def steps_on(rig: RigFile, plan: Plan) -> int:
 
 def figures(results: Sequence[Result], recording: Recording[Plan]) -> Iterable[Shown]:
     """The standard's diagram first."""
+    from procedures.positioning import figures as drawn
+
     return drawn.all_figures(results, recording.rig)
 
 

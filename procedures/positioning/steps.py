@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.recording import Recording, Step
+from bench.rigfile.roles import STATE
 from procedures.positioning.plan import Plan
 from procedures.positioning.targets import UP
 from procedures.positioning.way import Tested, tested
@@ -16,7 +17,6 @@ from procedures.positioning.way import Tested, tested
 Array = npt.NDArray[np.float64]
 REST, READING = "rest", "reading"
 READ = "reference-read"
-STATE = "state"
 
 
 @dataclass(frozen=True)

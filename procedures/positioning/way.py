@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from bench.rigfile import RigFile
 from bench.rigfile.capabilities_of_reference import ReferenceInstrument
-from bench.rigfile.stage import StageAxis, axes_of
+from bench.rigfile.stage import StageAxis
 from bench.rigfile.toleranced import Toleranced
 from procedures.positioning.fit import Errors
 from procedures.positioning.plan import Plan
+from procedures.positioning.requires import readable
 from procedures.positioning.targets import Array, fewest, targets
 
 
@@ -35,11 +36,6 @@ class Tested:
     def unit(self) -> str:
         """In which the operator reads it."""
         return self.by.unit or self.axis.unit
-
-
-def readable(rig: RigFile) -> Mapping[str, StageAxis]:
-    """Axes that are positioned and read by a reference instrument, by name."""
-    return {name: axis for name, axis in axes_of(rig).items() if name in rig.capabilities.reference}
 
 
 def tested(rig: RigFile, plan: Plan) -> Sequence[Tested]:

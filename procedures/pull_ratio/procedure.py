@@ -15,34 +15,30 @@ from bench.errors import AnalysisError
 from bench.figures import Figure
 from bench.findings import Effect, Finding, Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
-from procedures.pull_ratio import checks, estimates
-from procedures.pull_ratio import figures as drawn
+from procedures.pull_ratio import estimates
 from procedures.pull_ratio.estimates import Result
 from procedures.pull_ratio.plan import Plan
 from procedures.pull_ratio.planes import (
     BOTH,
     Level,
-    angles,
     asked,
     axes,
     captured,
-    currents,
     needed_N,
     order,
     place,
     planes,
-    positions,
     rate,
     settle_s,
 )
-from procedures.pull_ratio.steps import STATE, STEP, Taken, read_taken
+from procedures.pull_ratio.requires import requires
+from procedures.pull_ratio.steps import STEP, Taken, read_taken
 from procedures.shared import assumptions, planned
 from procedures.shared.rates import of_rate
 
@@ -133,6 +129,8 @@ class Evaluated:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Evaluated:
     """Ratios and centres."""
+    from procedures.pull_ratio import checks
+
     rig, plan = recording.rig, recording.plan
     taken = read_taken(recording)
     findings.gate(checks.of_signals(taken, rig, plan))
@@ -185,29 +183,9 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(found: Evaluated, recording: Recording[Plan]) -> Iterable[Figure]:
     """Current over place, of each axis."""
+    from procedures.pull_ratio import figures as drawn
+
     return drawn.all_figures(found.result, found.taken, recording.rig)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig has."""
-    wanted = ("coil_map", "loop_injection")
-    if rig.capabilities.coil_map is None or rig.capabilities.loop_injection is None:
-        return Requires(capabilities=wanted, capture=())
-    found = planes(rig)
-    lacks = []
-    if len(found) != 2:
-        lacks.append(f"capabilities.coil_map.systems: found {len(found)} that give a radial force; expected two")
-    without = [c for p in found for c, loop in zip(p.system.axes, p.loops, strict=True) if not loop]
-    if without:
-        lacks.append(f"capabilities.loop_injection.loops: found no set_point of {', '.join(without)}")
-    return Requires(
-        channels=(*positions(rig), *angles(rig), STATE),
-        sensors=(*positions(rig), *(coil for p in found for coil in p.system.coils)),
-        capabilities=wanted,
-        capture=(*positions(rig), *currents(rig), *angles(rig)),
-        uses=("settings.observer", "motion", "hold", "force_currents"),
-        lacks=tuple(lacks),
-    )
 
 
 def left_out(plan: Plan) -> tuple[Quantity, ...]:

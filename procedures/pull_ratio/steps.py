@@ -9,11 +9,12 @@ import numpy.typing as npt
 
 from bench.recording import Recording, Step
 from bench.rigfile import RigFile
+from bench.rigfile.roles import STATE
 from procedures.pull_ratio.plan import Plan
 from procedures.pull_ratio.planes import BOTH, Level, angles, axes, captured, currents, loop, planes, positions
 
 Array = npt.NDArray[np.float64]
-STEP, STATE = "level", "state"
+STEP = "level"
 
 
 @dataclass(frozen=True)

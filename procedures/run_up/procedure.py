@@ -7,14 +7,12 @@ critical speeds, their amplification factors, and how far they stand off the run
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from bench.errors import AnalysisError, BenchError
 from bench.figures import Shown
 from bench.findings import Effect, Finding, Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
@@ -26,10 +24,9 @@ from procedures.amb_rotor import lift, pushes, wiring
 from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.laws import of_laws
 from procedures.amb_rotor.lift import NO_SPEED
-from procedures.run_up import checks, estimates
-from procedures.run_up import figures as drawn
-from procedures.run_up.estimates import Run
+from procedures.run_up import checks
 from procedures.run_up.plan import Passing, Plan
+from procedures.run_up.requires import requires
 from procedures.run_up.steps import MISSED, PASSAGE, read_passage
 from procedures.shared import assumptions, first_look
 from procedures.shared.rates import rate_of
@@ -40,6 +37,9 @@ from procedures.synchronous.default_speeds import within_envelope
 from procedures.synchronous.dwells import SLOW, can_capture, captured_channels, read_dwell
 from procedures.unbalance import procedure as unbalance
 from procedures.unbalance.procedure import CURRENT, D_MAX, MAJOR, READ, SHARE, VOLTAGE
+
+if TYPE_CHECKING:
+    from procedures.run_up.estimates import Run
 
 COSINE, SINE = unbalance.COSINE, unbalance.SINE
 SPEED = Quantity("critical_speed", "rad/s", "where the amplitude of a probe is greatest, with a factor of 2.5 or more; "
@@ -176,6 +176,8 @@ def _fetch(rig: Rig, plan: Passing, record: Recorder, speed: float) -> None:
 
 def evaluate(recording: Recording[Any], findings: Findings) -> Run:
     """The passage's curves with their criticals, and the vectors at the captures' speeds."""
+    from procedures.run_up import estimates
+
     first_look.gate(recording, findings, wiring.before_orbits(recording))
     findings.gate([*wiring.before_orbits(recording), *checks.before(recording)])
     plan = recording.plan
@@ -222,13 +224,9 @@ def check(rig: RigFile, plan: Passing) -> Iterable[str]:
 
 def figures(run: Run, recording: Recording[Any]) -> Iterable[Shown]:
     """Bode pairs, polar plots, waterfall, order map, coil use, orbits."""
+    from procedures.run_up import figures as drawn
+
     return drawn.all_figures(run, recording.rig, recording.plan.running_rad_s)
-
-
-def requires(rig: RigFile) -> Requires:
-    """What the unbalance response needs; the greatest coil voltage of each bearing is shown where it is told."""
-    needed, told = unbalance.requires(rig), conventions(rig).plane_voltages
-    return replace(needed, channels=(*needed.channels, *told), uses=(*needed.uses, "flatness", "gains"))
 
 
 procedure = Procedure(

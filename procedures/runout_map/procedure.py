@@ -9,25 +9,25 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
+from typing import TYPE_CHECKING
 
 from bench.errors import BenchError
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
-from procedures.runout_map import checks, estimates
-from procedures.runout_map import figures as drawn
-from procedures.runout_map.estimates import Results
 from procedures.runout_map.plan import Plan
-from procedures.runout_map.planes import planes
-from procedures.runout_map.steps import STATE, TURN, read_turns
+from procedures.runout_map.requires import requires
+from procedures.runout_map.steps import TURN, read_turns
 from procedures.shared import assumptions, planned
+
+if TYPE_CHECKING:
+    from procedures.runout_map.estimates import Results
 
 RUNOUT = Quantity("runout", "m", "runout of the probes' target less that of the magnets, of one plane and part")
 CURRENT = Quantity("runout_current", "A", "bearing current that turns with the shaft, of one plane and part",
@@ -98,6 +98,8 @@ def _slow(rig: Rig, plan: Plan) -> Iterator[None]:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     """Vectors of each plane."""
+    from procedures.runout_map import checks, estimates
+
     rig, plan, turned = recording.rig, recording.plan, read_turns(recording)
     findings.gate(checks.of_signals(turned, rig, plan))
     results = estimates.results(turned, rig, plan)
@@ -133,27 +135,10 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(results: Results, recording: Recording[Plan]) -> Iterable[Figure]:
     """The vectors."""
+    from procedures.runout_map import figures as drawn
+
     del recording
     return drawn.all_figures(results)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig has."""
-    motion, of = rig.capabilities.motion, planes(rig)
-    if motion is None or rig.capabilities.hold is None:
-        return Requires(capabilities=("hold", "motion"))
-    lacks = [] if of else ["capabilities.hold.axes: found none of two axes, or no [shaft]"]
-    return Requires(
-        channels=(
-            motion.angle_channel,
-            motion.place_channel,
-            STATE,
-            *(c for p in of for c in (*p.positions, *p.currents)),
-        ),
-        sensors=tuple(c for p in of if p.motor for c in rig.motors[p.motor].currents),
-        capabilities=("hold", "motion"),
-        lacks=tuple(lacks),
-    )
 
 
 procedure = Procedure(

@@ -10,13 +10,13 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.recording import Recording, Step
+from bench.rigfile.roles import STATE
 from procedures.position_loops.lines import unwound
 from procedures.runout_map.plan import Plan
 from procedures.runout_map.planes import planes
 
 Array = npt.NDArray[np.float64]
 TURN = "turn"
-STATE = "state"
 
 
 @dataclass(frozen=True)

@@ -15,14 +15,7 @@ from bench.uncertainty import coverage_factor
 from bench.units import RPM
 from procedures.sensitivity.estimates import Peak, Result, mode_top
 from procedures.sensitivity.plan import Plan
-from procedures.sensitivity.steps import (
-    INJECT,
-    MODE,
-    Taken,
-    folds,
-    grid_of,
-    name_speed,
-)
+from procedures.sensitivity.steps import INJECT, MODE, Taken, folds, grid_of, name_speed
 from procedures.shared import signals
 
 ZONES = (3.0, 4.0, 5.0)

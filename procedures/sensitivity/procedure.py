@@ -16,27 +16,24 @@ from bench.errors import AnalysisError
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.capture import Layout
-from bench.rigfile.recorded import AGE, COUNT
 from procedures.amb_rotor import lift, pushes, wiring
 from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.laws import of_laws
-from procedures.sensitivity import checks, estimates, fitting, modes, sines
-from procedures.sensitivity import figures as drawn
+from procedures.sensitivity import estimates, fitting, modes, sines
 from procedures.sensitivity.estimates import Candidate, Result
 from procedures.sensitivity.fitting import chosen_axes
 from procedures.sensitivity.injection import Comb, combs, inject, repeated
 from procedures.sensitivity.plan import Plan
+from procedures.sensitivity.requires import requires
 from procedures.sensitivity.steps import (
     HALF,
     INJECT,
-    LOOP,
     MODE,
     REFINED,
     SCAN,
@@ -47,7 +44,6 @@ from procedures.sensitivity.steps import (
     grid_of,
     read_taken,
     sensitivity,
-    telemetry_channels,
 )
 from procedures.shared import assumptions, first_look
 
@@ -200,6 +196,8 @@ def _take(
 
 def evaluate(recording: Recording[Any], findings: Findings) -> list[Result]:
     """S, its peak and the margins, of each axis and speed."""
+    from procedures.sensitivity import checks
+
     first_look.gate(recording, findings, wiring.before_orbits(recording))
     findings.gate([*wiring.before_orbits(recording), *checks.before(recording)])
     plan, taken = recording.plan, sines.joined(read_taken(recording))
@@ -227,25 +225,10 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(results: Sequence[Result], recording: Recording[Plan]) -> Iterable[Figure]:
     """|S| over its zones, Bode pair of S, Nyquist plot and coherence, by speed."""
+    from procedures.sensitivity import figures as drawn
+
     del recording
     return drawn.all_figures(results)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig's machine has."""
-    machine = conventions(rig)
-    moves = machine.unmoved([c for c, _ in lift.NUDGES])
-    return Requires(
-        lacks=(*machine.stations.lacks, *moves),
-        channels=telemetry_channels(machine),
-        capabilities=("set_points", "injection"),
-        capture=(
-            *LOOP,
-            *((machine.pulsed or (COUNT, AGE)) if machine.marked else ()),
-            *machine.all_currents,
-        ),
-        uses=("settings.law", "settings.lift", "injection.lines", "injection.step", "mark"),
-    )
 
 
 procedure = Procedure(

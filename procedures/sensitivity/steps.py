@@ -14,18 +14,18 @@ from bench.analysis.responses import Response, clear_of_orders, lines, response,
 from bench.analysis.tachometer import counted, tachometer
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
-from bench.rigfile.roles import SPEED, STATUS
+from bench.rigfile.roles import STATUS
 from bench.units import RPM
 from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.machine import AmbRotor
 from procedures.sensitivity.injection import in_whole_samples
+from procedures.sensitivity.requires import LOOP, _axial, telemetry_channels
 from procedures.shared.signals import clips
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 INJECT, NOT_REACHED = "inject", "not-reached"
 WIRING, SURVEY, SCAN, MODE, REFINED, HALF = "wiring", "survey", "scan", "mode", "refined", "half"
-LOOP = ("inject", "before", "after")
 ORDERS = (1.0, 2.0, 3.0, 4.0)
 CLEAR_HZ = 3.0  # to either side of an order of the shaft's speed
 SHARING, FEW = 15, 4  # lines to either side that share a noise; at the ends of a grid
@@ -111,15 +111,6 @@ def shared_noise(r: Response, octaves: bool = False) -> Array:
 def name_speed(speed: float) -> str:
     """A speed, for the reader."""
     return f"{speed * RPM:.0f} r/min" if speed else "at rest"
-
-
-def telemetry_channels(machine: AmbRotor) -> tuple[str, ...]:
-    """What is read of the telemetry."""
-    return (*machine.stations.channels, *_axial(machine), STATUS, *((SPEED,) if machine.marked else ()))
-
-
-def _axial(machine: AmbRotor) -> tuple[str, ...]:
-    return (machine.position(machine.axial),) if machine.axial in machine.probes else ()
 
 
 def captured_channels(machine: AmbRotor, kind: str, speed: float) -> tuple[str, ...]:

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import count
+from typing import TYPE_CHECKING
 
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
@@ -20,14 +20,15 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
 from procedures.position_loops.injection import BELOW, FORCE, Sine, ability, injected, parameters_of
-from procedures.sensor_delay import checks, estimates
-from procedures.sensor_delay import figures as drawn
-from procedures.sensor_delay.estimates import Result
 from procedures.sensor_delay.plan import Plan
+from procedures.sensor_delay.requires import requires
 from procedures.sensor_delay.sines import captured, probes, rate, sines
-from procedures.sensor_delay.steps import SINE, STATE, read_taken
+from procedures.sensor_delay.steps import SINE, read_taken
 from procedures.shared import assumptions, planned
 from procedures.shared.rates import of_rate
+
+if TYPE_CHECKING:
+    from procedures.sensor_delay.estimates import Result
 
 DELAY = Quantity("delay", "s", "time by which a probe's reading is behind the currents that are read with it",
                  title="delay of the position sensor")  # fmt: skip
@@ -76,6 +77,8 @@ def _sine(rig: Rig, plan: Plan, record: Recorder, loop: str, line: int, one: Sin
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> list[Result]:
     """Delay of each probe."""
+    from procedures.sensor_delay import checks, estimates
+
     rig, plan, taken = recording.rig, recording.plan, read_taken(recording)
     findings.gate(checks.of_signals(taken, rig, plan))
     results = estimates.results(taken, rig, plan)
@@ -106,18 +109,10 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(results: Sequence[Result], recording: Recording[Plan]) -> Iterable[Figure]:
     """Phases over the frequency."""
+    from procedures.sensor_delay import figures as drawn
+
     del recording
     return drawn.all_figures(results)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig has."""
-    wanted, can, some = ("loop_injection", "hold"), rig.capabilities.loop_injection, probes(rig)
-    if can is None or rig.capabilities.hold is None:
-        return Requires(capabilities=wanted, capture=())
-    lacks = [] if FORCE in can.places else ["capabilities.loop_injection.places: found no force"]
-    lacks += [] if some else ["capabilities.loop_injection.loops: found none of a position of capabilities.hold.axes"]
-    return Requires(channels=(STATE,), capabilities=wanted, capture=captured(rig), lacks=tuple(lacks))
 
 
 procedure = Procedure(

@@ -8,13 +8,14 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.recording import Recording, Step
+from bench.rigfile.roles import STATE
 from procedures.position_loops.injection import ability
 from procedures.position_loops.lines import without_trend
 from procedures.sensor_delay.plan import Plan
 from procedures.sensor_delay.sines import probes
 
 Array = npt.NDArray[np.float64]
-SINE, STATE = "sine", "state"
+SINE = "sine"
 
 
 @dataclass(frozen=True)

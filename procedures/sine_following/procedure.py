@@ -11,17 +11,16 @@ from collections.abc import Iterable, Iterator, Mapping
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.stage import StageAxis
-from procedures.sine_following import checks, estimates
-from procedures.sine_following import figures as drawn
+from procedures.sine_following import estimates
 from procedures.sine_following.estimates import LAG, LARGEST, RATIO, RMS, TRUE, Results
 from procedures.sine_following.plan import Plan
+from procedures.sine_following.requires import requires
 from procedures.sine_following.steps import SINE, amplitude, modes_of, read
 from procedures.stages import assumptions, tracks
 from procedures.stages.tracks import TOGETHER, Mode, chosen, sisters, waits_at
@@ -86,6 +85,8 @@ def waves(axes: Iterable[StageAxis], mode: Mode, plan: Plan) -> dict[str, float]
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     """Whether set points were sines, and what the axes did."""
+    from procedures.sine_following import checks
+
     rig, plan, rides = recording.rig, recording.plan, read(recording)
     findings.gate(checks.of_rides(rides, rig, plan))
     groups = estimates.grouped(rides, plan)
@@ -115,16 +116,9 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(found: Results, recording: Recording[Plan]) -> Iterable[Figure]:
     """Set point and reading over a period, and the error."""
+    from procedures.sine_following import figures as drawn
+
     return drawn.all_figures(found, recording.plan)
-
-
-def requires(rig: RigFile) -> Requires:
-    """A positioned stage whose controller gives sines."""
-    found = tracks.requires(rig, ("wave",))
-    lacks = [f"capabilities.positioning.axes.{a.name}.wave: found no sine" for a in chosen(rig, "all")
-             if a.wave is not None and a.wave.sine is None]  # fmt: skip
-    return Requires(found.roles, found.channels, capabilities=found.capabilities, uses=found.uses,
-                    lacks=(*found.lacks, *lacks))  # fmt: skip
 
 
 procedure = Procedure(

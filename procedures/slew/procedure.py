@@ -8,27 +8,28 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
 
 from bench.calibration import Need
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from procedures.servomotor import carrying, hold, segments, wiring
-from procedures.servomotor.conventions import conventions
-from procedures.servomotor.parameters import named, needed, stated, write
+from procedures.servomotor.parameters import named, stated, write
 from procedures.shared import assumptions
-from procedures.slew import estimates, fit, steps
-from procedures.slew import figures as drawn
-from procedures.slew.estimates import Result
+from procedures.slew import fit, steps
 from procedures.slew.fit import Gains
 from procedures.slew.plan import Plan
-from procedures.slew.steps import STARTED, STEP, channels, read_swings
+from procedures.slew.requires import requires
+from procedures.slew.steps import STARTED, STEP, read_swings
+
+if TYPE_CHECKING:
+    from procedures.slew.estimates import Result
 
 RMS = Quantity("error_rms", "rad", "root mean square of the tracking error, free of the encoder's counts")
 PEAK = Quantity("error_peak", "rad", "greatest tracking error")
@@ -37,8 +38,6 @@ LAG = Quantity("lag", "s", "how much later than the reference the angle swings")
 DETENT = Quantity("detent", "N m", "amplitude of the torque that goes with 16 times the angle")
 FRICTION = Quantity("friction", "N m", "torque against the movement at the slowest frequency, mean over the swing")
 MEASURES = (RMS, PEAK, RATIO, LAG, DETENT, FRICTION)
-NEEDED = ("motor.sine", "motor.sine_hz", "motor.ramp", "motor.share", "motor.allocation", "angle.low_pass_hz",
-          "angle.derivative_on_error")  # fmt: skip
 FADE = 20
 DESIGN_NM_A = 2.87  # T Table 6.2; with a tenth of it either way where no calibration is used
 
@@ -90,6 +89,8 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     """The swings by frequency, and what the slowest says of the torque."""
+    from procedures.slew import estimates
+
     findings.gate(segments.before_carrying(recording))
     findings.gate(steps.of_signals(recording), ("stuck-channel",))
     result = estimates.evaluate(recording, read_swings(recording), gains(recording.plan))
@@ -133,19 +134,9 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(result: Result, recording: Recording[Plan]) -> Iterable[Figure]:
     """Angle and error over time and over angle, growth with frequency, torque current over angle, its orders."""
+    from procedures.slew import figures as drawn
+
     return drawn.all_figures(result, recording.plan.detent_order)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig's machine has."""
-    machine = conventions(rig)
-    return Requires(
-        lacks=machine.lacks,
-        roles=("levitation", "rotation"),
-        channels=(*channels(machine), *wiring.channels(machine)),
-        parameters=needed(rig, *hold.NEEDED, *wiring.needs(rig), *NEEDED, "motor.segment_limit"),
-        machine=("polar_inertia",),
-    )
 
 
 procedure = Procedure(

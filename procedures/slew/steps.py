@@ -10,17 +10,13 @@ from bench.errors import AnalysisError
 from bench.findings import Effect, Finding
 from bench.recording import Recording, Step
 from bench.rigfile.roles import ANGLE, STATUS
-from procedures.servomotor.conventions import Servomotor, conventions
+from procedures.servomotor.conventions import conventions
 from procedures.servomotor.parameters import parameter
 from procedures.slew.fit import Swing
 from procedures.slew.plan import Plan
+from procedures.slew.requires import channels
 
 STEP, STARTED = "swing", "sine-started"
-
-
-def channels(machine: Servomotor) -> tuple[str, ...]:
-    """What is recorded of a swing."""
-    return (ANGLE, *machine.segments, STATUS)
 
 
 def read_swings(recording: Recording[Plan]) -> list[Swing]:

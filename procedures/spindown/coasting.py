@@ -15,25 +15,18 @@ import numpy as np
 from bench.errors import NotReached
 from bench.figures import Figure, Series
 from bench.findings import Effect, Finding, Findings
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from bench.rigfile.roles import SPEED, STATUS, is_bound
+from bench.rigfile.roles import SPEED, is_bound
 from bench.uncertainty import Estimate
 from procedures.amb_rotor.conventions import conventions
 from procedures.spindown import coasts, fit
 from procedures.spindown.coasts import COAST, SPIN, Coasting, Short, read_coasts, slowest
 from procedures.spindown.plan import Plan
-from procedures.synchronous import mark
 
 NOT_REACHED = "not-reached"
-
-
-def applies(rig: RigFile) -> bool:
-    """Whether the controller has no motor of its own that turns the shaft."""
-    return not any("rotation" in d.roles for d in rig.devices.values())
 
 
 @dataclass(frozen=True)
@@ -128,17 +121,6 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
         yield "run_up: found motor; the rig file has no device in the role rotation"
     if plan.motor_carries:
         yield "motor_carries: found true; there is no motor that could carry an end of the shaft"
-
-
-def requires(rig: RigFile) -> Requires:
-    """A drive, a mark, and the inertia; without a mark that counts, a motor would do as well."""
-    inertia = "polar_inertia" in rig.machine or (rig.shaft is not None and rig.shaft.polar_inertia is not None)
-    lacks = () if inertia else ("shaft.polar_inertia: found none; B is the decay rate times the inertia",)
-    absent = ", ".join(role.partition(".")[2] for role in mark.needed(rig) if not is_bound(rig, role))
-    if absent and any("drive" in d.roles for d in rig.devices.values()):
-        none = f"devices: found none in the role rotation, and for a drive's run-downs the mark has no channel for {absent}"
-        return Requires(lacks=(none, *lacks))
-    return Requires(roles=("levitation", "drive"), channels=(*mark.needed(rig), STATUS), lacks=lacks)
 
 
 def figures(found: Coasted) -> Iterable[Figure]:

@@ -25,7 +25,8 @@ from procedures.servomotor.conventions import Servomotor, conventions
 from procedures.shared.certificates import certified, certified_sensors
 from procedures.spindown.fit import Coast, inertia_from_ring
 from procedures.spindown.plan import Plan
-from procedures.spindown.steps import RunDown, coils
+from procedures.spindown.requires import coils
+from procedures.spindown.steps import RunDown
 
 Array = npt.NDArray[np.float64]
 METHODS: Mapping[str, Callable[[RunDown], Coast]] = {"angle": lambda r: r.of_angle, "speed": lambda r: _by_speed(r)}

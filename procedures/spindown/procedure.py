@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from bench.figures import Figure
 from bench.findings import Finding, Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.procedure.states import transition
@@ -22,15 +22,17 @@ from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
 from procedures.servomotor import carrying, hold, segments, wiring
 from procedures.servomotor.conventions import conventions
-from procedures.servomotor.parameters import BIASES, chosen, named, needed, write
+from procedures.servomotor.parameters import BIASES, chosen, named, write
 from procedures.shared import assumptions
-from procedures.spindown import checks, coasting, estimates, waves
-from procedures.spindown import figures as drawn
+from procedures.spindown import coasting, waves
 from procedures.spindown.coasting import Coasted
-from procedures.spindown.estimates import Drag
 from procedures.spindown.plan import Plan
+from procedures.spindown.requires import by_drive, requires
 from procedures.spindown.running_down import SLOW, run_down
-from procedures.spindown.steps import RunDown, channels, coils, read_run_downs
+from procedures.spindown.steps import RunDown, read_run_downs
+
+if TYPE_CHECKING:
+    from procedures.spindown.estimates import Drag
 
 B = Quantity("B", "N m s/rad", "viscous drag, mean over the directions that it was turned in")
 B_HIGH = Quantity(
@@ -44,7 +46,7 @@ BY_SPEED, CARRIED = "by the speed channel", "motor carries"
 
 def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
     """Lifted at the first bias and with the angle released: no loop is closed before the encoder's direction is known."""
-    if coasting.applies(rig):
+    if by_drive(rig):
         return coasting.settings(rig)
     return named(rig, {**dict.fromkeys(BIASES, plan.bias_A), **hold.RELEASED})
 
@@ -69,7 +71,7 @@ def fewest_steps(plan: Plan) -> int:
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Run down in both directions at both biases, and with the ring; the angle is held again in the end. Where the rig has no
     motor, as `coasting`."""
-    if coasting.applies(rig.file):
+    if by_drive(rig.file):
         coasting.acquire(rig, plan, record)
         return
     hold.probe(rig, record)
@@ -133,7 +135,10 @@ class Analysis:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis | Coasted:
     """The run-downs, evaluated by the angle and by the speed; where the rig has no motor, as `coasting`."""
-    if coasting.applies(recording.rig):
+    from procedures.spindown import checks, estimates
+    from procedures.spindown import figures as drawn
+
+    if by_drive(recording.rig):
         return coasting.evaluate(recording, findings)
     findings.gate([*checks.before_fits(recording), *segments.of_nudges(recording)])
     plan, rig, runs = recording.plan, recording.rig, read_run_downs(recording)
@@ -155,17 +160,20 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis | Coast
 
 def measured(a: Analysis | Coasted) -> Iterator[Measured]:
     """B and T_c by the speed if it could be fitted, and all quantities by the angle, which are the results."""
+
     state = CARRIED if isinstance(a, Analysis) and a.motor_carries else ""
     if isinstance(a, Analysis) and a.speed is not None:
         for quantity in (B, T_C):
             yield quantity.measured(a.speed.estimates[quantity.name], f"{state}, {BY_SPEED}" if state else BY_SPEED)
-    estimates = facts(a)
+    stated = facts(a)
     for quantity in MEASURES:
-        if quantity.name in estimates:
-            yield quantity.measured(estimates[quantity.name], state)
+        if quantity.name in stated:
+            yield quantity.measured(stated[quantity.name], state)
 
 
 def _inertia(result: Drag, rig: RigFile) -> Estimate:
+    from procedures.spindown import estimates
+
     return result.estimates.get("J_z") or estimates.stated_inertia(rig)
 
 
@@ -183,7 +191,7 @@ def holds_for(plan: Plan) -> dict[str, float]:
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
-    if coasting.applies(rig):
+    if by_drive(rig):
         yield from coasting.check(rig, plan)
         return
     needed = ["ring_inertia"] if plan.added_inertia else ["polar_inertia"]
@@ -206,23 +214,11 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(a: Analysis | Coasted, recording: Recording[Plan]) -> Iterable[Figure]:
     """Speed over time with fit and residuals, deceleration and loss power over speed."""
+    from procedures.spindown import figures as drawn
+
     if isinstance(a, Coasted):
         return coasting.figures(a)
     return drawn.all_figures(a.runs, a.angle, recording.plan.speed_rad_s)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig's machine has."""
-    if coasting.applies(rig):
-        return coasting.requires(rig)
-    machine = conventions(rig)
-    return Requires(
-        lacks=machine.lacks,
-        roles=("levitation", "rotation"),
-        channels=channels(machine),
-        sensors=coils(machine),
-        parameters=needed(rig, *hold.NEEDED, *BIASES, "angle.speed"),
-    )
 
 
 procedure = Procedure(
@@ -241,8 +237,8 @@ procedure = Procedure(
     settings=settings,
     step_count=step_count,
     fewest_steps=fewest_steps,
-    steps_on=lambda rig, plan: coasting.steps(plan) if coasting.applies(rig) else step_count(plan),
-    untold=lambda rig: (B_HIGH,) if coasting.applies(rig) else (),  # there at the bias that the controller has
+    steps_on=lambda rig, plan: coasting.steps(plan) if by_drive(rig) else step_count(plan),
+    untold=lambda rig: (B_HIGH,) if by_drive(rig) else (),  # there at the bias that the controller has
     facts=facts,
     holds_for=holds_for,
     assumes=assumptions.SPINDOWN,

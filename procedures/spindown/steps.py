@@ -15,6 +15,7 @@ from procedures.servomotor.conventions import Servomotor, conventions
 from procedures.spindown import fit
 from procedures.spindown.fit import Coast
 from procedures.spindown.plan import Plan
+from procedures.spindown.requires import channels, coils
 
 Array = npt.NDArray[np.float64]
 ANGLE_LAGS = 60  # samples of 1 ms over which its residuals repeat themselves
@@ -29,16 +30,6 @@ RELEASE_S = 0.01  # a command and the amplifiers: what drove the rotor is gone
 LED_SAMPLES = 20  # of a step that begins before the motor is let go
 GONE, GONE_SAMPLES = 0.1, 10  # of the torque current before: let go, if it stays so
 LEAST_A, ZERO_A = 0.03, 0.01  # that holds a speed; of its sensors without any
-
-
-def coils(machine: Servomotor) -> tuple[str, ...]:
-    """The radial AMBs' currents."""
-    return machine.coils_of("xi", "xo", "yi", "yo")
-
-
-def channels(machine: Servomotor) -> tuple[str, ...]:
-    """What is recorded of a coast."""
-    return (ANGLE, SPEED, STATUS, *machine.segments, *coils(machine))
 
 
 @dataclass(frozen=True)

@@ -15,12 +15,12 @@ from bench.procedure.requires import Requires
 from bench.recording import Recording, Step
 from bench.rigfile import RigFile
 from bench.rigfile.binding import STAGE_HELD
+from bench.rigfile.roles import STATE
 from bench.rigfile.stage import StageAxis, axes_of
 from procedures.shared import signals
 from procedures.stages.counts import lacks_counts, pitch_of
 
 Array = npt.NDArray[np.float64]
-STATE = "state"
 TOGETHER = "together"
 INTEGRATORS = "integrators"
 STANDS = 1.5  # counts, in which a reading that stands may change

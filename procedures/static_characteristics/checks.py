@@ -16,7 +16,8 @@ from procedures.static_characteristics.estimates import FIRST, Result
 from procedures.static_characteristics.model import MAP, Array, Rows, Terms, q_of
 from procedures.static_characteristics.plan import Plan
 from procedures.static_characteristics.readings import held, less_zeros, rows
-from procedures.static_characteristics.steps import Taken, cells
+from procedures.static_characteristics.requires import cells
+from procedures.static_characteristics.steps import Taken
 
 READY = "READY"
 FEWEST = 6  # places

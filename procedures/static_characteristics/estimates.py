@@ -20,7 +20,8 @@ from procedures.static_characteristics.fit import Found, Known
 from procedures.static_characteristics.known import certificates
 from procedures.static_characteristics.model import MAP, PHASES, Array, Rows, Terms, held_at, q_of
 from procedures.static_characteristics.readings import held, rows
-from procedures.static_characteristics.steps import Taken, cells
+from procedures.static_characteristics.requires import cells
+from procedures.static_characteristics.steps import Taken
 
 UNITS = {"slope": "H/m", "length": "m", "overlap": "m", "fringe": "m", "zero": "rad", "centre": "m", "saturation": "A",
          "give": "rad/(N m)", "give_x": "m/N", "force": "N", "torque": "N m", "held": "N", "held_angle": "N m"}  # fmt: skip

@@ -40,7 +40,8 @@ from procedures.static_characteristics.model import Array, Rows, Terms, shown
 from procedures.static_characteristics.places import SIDES, grid, repeated
 from procedures.static_characteristics.plan import Plan
 from procedures.static_characteristics.readings import less_zeros, rows
-from procedures.static_characteristics.steps import READING, Cell, Taken, cells, taken_at
+from procedures.static_characteristics.requires import Cell, cells
+from procedures.static_characteristics.steps import READING, Taken, taken_at
 
 STEPS = (1e-5, 1e-4)  # m and rad, for slopes of the model
 SUSPECTS = "a cell or its arm, the encoder's zero, a current sensor, or the magnetic circuit"

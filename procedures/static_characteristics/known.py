@@ -10,7 +10,7 @@ from bench.rigfile.toleranced import Toleranced
 from procedures.stages.stators import Phase
 from procedures.static_characteristics.fit import Known
 from procedures.static_characteristics.model import Rows, Terms
-from procedures.static_characteristics.steps import Cell
+from procedures.static_characteristics.requires import Cell
 
 COUNT = 1 / math.sqrt(12)  # standard uncertainty of a reading within its count
 EXACT = 1e-9

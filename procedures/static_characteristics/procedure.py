@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import count
+from typing import TYPE_CHECKING
 
 from bench.calibration import Need
 from bench.errors import AnalysisError
 from bench.figures import Shown
 from bench.findings import Effect, Finding, Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.procedure.states import transition
@@ -26,14 +26,16 @@ from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
 from procedures.shared import continued
 from procedures.stages import assumptions
-from procedures.stages.stators import POLES, axis, lacks, phases
-from procedures.static_characteristics import checks, estimates, halves
-from procedures.static_characteristics import figures as drawn
+from procedures.stages.stators import axis, phases
+from procedures.static_characteristics import checks, halves
 from procedures.static_characteristics.beside import Beside, by_flux, of_controller
-from procedures.static_characteristics.estimates import Result
 from procedures.static_characteristics.places import SIDES, Load, grid, loads, repeated
 from procedures.static_characteristics.plan import Plan
-from procedures.static_characteristics.steps import READ, READING, STATE, Cell, cells, read_taken
+from procedures.static_characteristics.requires import Cell, cells, requires
+from procedures.static_characteristics.steps import READ, READING, read_taken
+
+if TYPE_CHECKING:
+    from procedures.static_characteristics.estimates import Result
 
 PART = "cells"
 MAP = "inductance-map"
@@ -138,6 +140,8 @@ def _read(
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     """Loads, and the map that fits them."""
+    from procedures.static_characteristics import estimates
+
     rig, plan, taken = recording.rig, recording.plan, read_taken(recording)
     findings.gate(checks.of_signals(taken, rig, plan))
     findings.gate(checks.of_order(taken, rig))
@@ -187,33 +191,10 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(result: Result, recording: Recording[Plan]) -> Iterable[Shown]:
     """Torque and force."""
+    from procedures.static_characteristics import figures as drawn
+
     del recording
     return drawn.all_figures(result)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig has."""
-    wanted, some = ("positioning", "phase_test", "load_cells"), phases(rig)
-    if rig.capabilities.phase_test is None or rig.capabilities.positioning is None or not rig.capabilities.load_cells:
-        return Requires(roles=("motion",), capabilities=wanted)
-    test, both = rig.capabilities.phase_test, cells(rig)
-    axes = [a for a in (axis(rig, "stroke"), axis(rig, "angle")) if a is not None]
-    without = [a.name for a in axes if a.name not in rig.capabilities.load_cells]
-    return Requires(
-        roles=("motion", "operator"),
-        channels=(STATE, *(a.channel for a in axes), *(c.by.channel for c in both or () if c.by.channel)),
-        sensors=tuple(p.current for p in some),
-        machine=(POLES,),
-        capabilities=wanted,
-        lacks=(*lacks(rig, 2), *(f"capabilities.load_cells: found none of {name}" for name in without),
-               *(("capabilities.phase_test: found no current",) if not test.current else ()),
-               *_six(len(some))),
-        uses=("model",),
-    )  # fmt: skip
-
-
-def _six(found: int) -> tuple[str, ...]:
-    return () if found == 6 else (f"capabilities.phase_test.phases: found {found} of known motors; expected 6",)
 
 
 def untold(rig: RigFile) -> tuple[Quantity, ...]:

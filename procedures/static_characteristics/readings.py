@@ -9,7 +9,8 @@ import numpy as np
 from bench.rigfile import RigFile
 from procedures.stages.stators import phases, poles
 from procedures.static_characteristics.model import Array, Rows
-from procedures.static_characteristics.steps import Cell, Taken
+from procedures.static_characteristics.requires import Cell
+from procedures.static_characteristics.steps import Taken
 
 TAKEN = 0.75  # of a reading's variance: mean of two sides, less that of four without currents
 

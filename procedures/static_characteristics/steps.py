@@ -10,30 +10,15 @@ import numpy.typing as npt
 
 from bench.recording import Recording, Step
 from bench.rigfile import RigFile
-from bench.rigfile.capabilities_of_cells import LoadCell
-from bench.rigfile.stage import StageAxis
+from bench.rigfile.roles import STATE
 from procedures.inductance_map.places import Place
-from procedures.stages.stators import Phase, axis, phases
+from procedures.stages.stators import Phase, phases
 from procedures.static_characteristics.places import SIDES, grid
 from procedures.static_characteristics.plan import Plan
+from procedures.static_characteristics.requires import Cell, cells
 
 Array = npt.NDArray[np.float64]
 READING, READ = "reading", "cell-read"
-STATE = "state"
-
-
-@dataclass(frozen=True)
-class Cell:
-    """A load cell with the axis that it holds; `length` m of its arm, 1 without one: load over what presses on it."""
-
-    axis: StageAxis
-    by: LoadCell
-    length: float
-
-    @property
-    def unit(self) -> str:
-        """In which the operator reads it."""
-        return self.by.unit or ("N" if self.axis.unit == "m" or self.by.arm else "N m")
 
 
 @dataclass(frozen=True)
@@ -59,18 +44,6 @@ class Taken:
     def where(self) -> str:
         """As findings name it: everywhere."""
         return ""
-
-
-def cells(rig: RigFile) -> tuple[Cell, Cell] | None:
-    """Along and around; None where the rig has not got both."""
-    out = []
-    for measures in ("stroke", "angle"):
-        found = axis(rig, measures)
-        if found is None or found.name not in rig.capabilities.load_cells:
-            return None
-        by = rig.capabilities.load_cells[found.name]
-        out.append(Cell(found, by, rig.geometry[by.arm.removeprefix("geometry/")].value if by.arm else 1.0))
-    return out[0], out[1]
 
 
 def read_taken(recording: Recording[Plan]) -> Taken:

@@ -22,7 +22,8 @@ from bench.recording import Recording, Step
 from bench.rigfile.roles import ANGLE, SPEED
 from procedures.amb_rotor.conventions import conventions
 from procedures.step import capturing
-from procedures.step.steps import ORDERS, STEP, TURNING_RAD_S, at_rest_if_untold, marked
+from procedures.step.requires import marked
+from procedures.step.steps import ORDERS, STEP, TURNING_RAD_S, at_rest_if_untold
 
 Array = npt.NDArray[np.float64]
 FALSE_ALARM = 1e-4

@@ -17,34 +17,21 @@ import numpy.typing as npt
 
 from bench.rigfile import RigFile
 from bench.rigfile.places import CENTRE, Places
-from bench.rigfile.supports import once_per_rig, radial_supports
+from bench.rigfile.supports import radial_supports
 from bench.rigfile.toleranced import Toleranced
 from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.stations import COORDINATES
 from procedures.step.coupled import ANY, Tilting
+from procedures.step.probes import is_plain
 
 Array = npt.NDArray[np.float64]
 SQUARE = math.sin(math.radians(1.0))  # of a cosine: axes that are so near to right angles are meant to be
-ALIKE = 1e-6  # of a cosine
 FIRM = 0.1  # of the logarithm of what a tilt weighs: what is stated of a shaft, and two equations of it
 
 
 def made_of(data: Mapping[str, npt.NDArray[Any]], shares: Mapping[str, float], count: int) -> Array:
     """A sum of channels (count,), each with its share."""
     return sum((w * data[c] for c, w in shares.items()), np.zeros(count))
-
-
-@once_per_rig
-def is_plain(rig: RigFile) -> bool:
-    """Whether there are four probes, which look the same two ways at both bearings, each so that it grows along its axis."""
-    machine = conventions(rig)
-    if not machine.probed or len(machine.stations.channels) > len(machine.axes):
-        return False
-    near, far = (
-        np.array([machine.stations.probes[machine.positions[k]].row[:2] for k in pair])
-        for pair in machine.planes.values()
-    )
-    return bool(np.allclose(near, far, rtol=0, atol=ALIKE))
 
 
 def shares(rig: RigFile, axis: str) -> dict[str, float]:

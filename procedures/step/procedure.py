@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from bench.errors import NotReached
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
@@ -24,13 +24,15 @@ from bench.units import RPM
 from procedures.amb_rotor import frame, lift
 from procedures.amb_rotor.conventions import conventions
 from procedures.shared import assumptions
-from procedures.step import capturing, checks, estimates, hum, planes, slewing
-from procedures.step import figures as drawn
-from procedures.step.estimates import Result
+from procedures.step import capturing, hum, planes, slewing
 from procedures.step.plan import Plan
-from procedures.step.position import is_plain, leans
+from procedures.step.position import leans
 from procedures.step.record_length import enough_s, faded_s
-from procedures.step.steps import STEP, TURNING_RAD_S, Case, Done, cases, channels, read_steps
+from procedures.step.requires import requires
+from procedures.step.steps import STEP, TURNING_RAD_S, Case, Done, cases, read_steps
+
+if TYPE_CHECKING:
+    from procedures.step.estimates import Result
 
 OVERSHOOT = Quantity("overshoot", "1", "greatest position beyond the step, as a share of it")
 RISE = Quantity("rise_time", "s", "10 to 90 % of the step")
@@ -172,6 +174,8 @@ class Results:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     """The response of each case, and what the cases of an axis have in common."""
+    from procedures.step import checks, estimates
+
     before = list(checks.before(recording))
     findings.gate(before)
     exchanged = [] if before else list(planes.find_exchanged(recording))
@@ -239,28 +243,10 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 def figures(results: Results, recording: Recording[Plan]) -> Iterable[Figure]:
     """Responses with band and model, control currents, overshoot over the size; the steps as they came where the evaluation
     ended with them."""
+    from procedures.step import figures as drawn
+
     del recording
     return drawn.all_figures(results.steps, results.by_case) if results.by_case else drawn.raw_figures(results.steps)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig's machine has."""
-    machine = conventions(rig)
-    read = channels(machine)
-    return Requires(
-        lacks=machine.lacks if is_plain(rig) else (*machine.lacks, *machine.stations.lacks),
-        channels=read,
-        sensors=capturing.channels(machine),
-        capabilities=("set_points",),
-        uses=(
-            "settings.law",
-            "gains",
-            "bias",
-            "model",
-            "mark",
-            *(["capture"] if capturing.captures(rig, machine) else []),
-        ),
-    )
 
 
 procedure = Procedure(

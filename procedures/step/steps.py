@@ -20,6 +20,7 @@ from procedures.amb_rotor.machine import AmbRotor
 from procedures.amb_rotor.onset import pushing
 from procedures.step import acting, capturing
 from procedures.step.position import ends_of, made_of, shares
+from procedures.step.requires import channels
 from procedures.step.response import trailing
 
 Array = npt.NDArray[np.float64]
@@ -83,16 +84,6 @@ class Done:
     expected: int
     machine: AmbRotor
     apart: float = 0.0
-
-
-def channels(machine: AmbRotor) -> tuple[str, ...]:
-    """What is read of a step."""
-    return (*capturing.channels(machine), *marked(machine), STATUS)
-
-
-def marked(machine: AmbRotor) -> tuple[str, ...]:
-    """Roles that tell how the shaft turns, where the rig has them."""
-    return (ANGLE, SPEED) if machine.marked else ()
 
 
 def read_steps(recording: Recording[Any]) -> list[Done]:

@@ -12,7 +12,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
@@ -20,10 +19,10 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from procedures.stages import assumptions, tracks
 from procedures.stages.tracks import Mode, chosen, sisters, waits_at
-from procedures.step_following import checks, estimates
-from procedures.step_following import figures as drawn
+from procedures.step_following import estimates
 from procedures.step_following.estimates import ERROR, OVER, TIME, TRUE, Results
 from procedures.step_following.plan import Plan
+from procedures.step_following.requires import requires
 from procedures.step_following.steps import DOWN, STEP, UP, modes_of, places, read, targets
 
 STATIC = sisters(ERROR, "where the axis stands beyond its set point, by the encoder's own scale, mean over repeats")
@@ -64,6 +63,8 @@ def _step(rig: Rig, plan: Plan, record: Recorder, mode: Mode, repeat: int, way: 
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     """Whether the axes were sent, and what they did."""
+    from procedures.step_following import checks
+
     rig, plan, moves = recording.rig, recording.plan, read(recording)
     findings.gate(checks.of_moves(moves, rig, plan))
     groups = estimates.grouped(moves, plan)
@@ -95,17 +96,14 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(found: Results, recording: Recording[Plan]) -> Iterable[Figure]:
     """Set point and reading, and the error in detail."""
+    from procedures.step_following import figures as drawn
+
     return drawn.all_figures(found, recording.plan)
 
 
 def steps_on(rig: RigFile, plan: Plan) -> int:
     """Of all modes."""
     return 2 * (plan.lead + plan.repeats) * len(modes_of(rig, plan))
-
-
-def requires(rig: RigFile) -> Requires:
-    """As any positioned stage."""
-    return tracks.requires(rig)
 
 
 procedure = Procedure(

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +18,6 @@ from bench.errors import RotorNotArrived
 from bench.figures import Figure
 from bench.findings import Finding, Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import NOTHING, Load, RigState
 from bench.recording import Recording
@@ -28,25 +28,26 @@ from procedures.servomotor import hold
 from procedures.servomotor.conventions import conventions
 from procedures.servomotor.direction import of_probe
 from procedures.servomotor.loads import check_masses
-from procedures.servomotor.parameters import BIASES, CURRENTS, named, needed, stated, write
+from procedures.servomotor.parameters import BIASES, CURRENTS, named, stated, write
 from procedures.shared import assumptions, continued, first_look
 from procedures.shared.continued import Done
 from procedures.shared.step_table import of_samples, record_step
-from procedures.torque_constant import checks, fit, halves
-from procedures.torque_constant import figures as drawn
-from procedures.torque_constant.fit import NO_DETENT, Balance, Detent
-from procedures.torque_constant.inputs import SIDES, arms_u, fit_inputs, masses_u
+from procedures.torque_constant import checks, halves
+from procedures.torque_constant.inputs import arms_u, fit_inputs, masses_u
 from procedures.torque_constant.plan import Plan
+from procedures.torque_constant.requires import requires
 from procedures.torque_constant.steps import (
     OnLever,
     OverDetent,
     Sideways,
     TorqueData,
-    channels,
     read_torques,
     read_wiring,
     wiring,
 )
+
+if TYPE_CHECKING:
+    from procedures.torque_constant.fit import Balance, Detent
 
 Array = npt.NDArray[np.float64]
 ALPHA_TAU = Quantity("alpha_tau", "N m/A", "torque per mean true segment current at the home angle, peak over gamma")
@@ -213,6 +214,9 @@ def measured(a: Analysis) -> Iterator[Measured]:
 
 def _fitted(recording: Recording[Plan], data: TorqueData) -> Analysis:
     """Fit and estimates with their influences."""
+    from procedures.torque_constant import fit
+    from procedures.torque_constant.fit import NO_DETENT
+
     plan, rig = recording.plan, recording.rig
     inputs, pairs, count = fit_inputs(rig, plan.masses), rig.machine["pole_pairs"].value, len(plan.masses)
     held = NO_DETENT
@@ -253,22 +257,9 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(a: Analysis, recording: Recording[Plan]) -> Iterable[Figure]:
     """Torque over current per side, the constant over gamma with residuals, detent, one step."""
+    from procedures.torque_constant import figures as drawn
+
     return drawn.all_figures(recording, a.data, a.balance, a.detent, recording.rig.machine["pole_pairs"].value)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig's machine has."""
-    machine = conventions(rig)
-    return Requires(
-        lacks=machine.lacks,
-        roles=("levitation", "rotation"),
-        channels=channels(machine),
-        sensors=machine.turning,
-        parameters=needed(rig, *hold.NEEDED, "motor.phase", "motor.across", "motor.along", "motor.ramp", *BIASES),
-        geometry=tuple(f"lever_{s}" for s in SIDES),
-        machine=("pole_pairs",),
-        masses=True,
-    )
 
 
 procedure = Procedure(

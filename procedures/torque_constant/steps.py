@@ -11,21 +11,17 @@ import numpy.typing as npt
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
 from bench.recording.earlier import AGAIN
-from bench.rigfile.roles import ANGLE, STATUS
+from bench.rigfile.roles import ANGLE
 from procedures.servomotor.conventions import Servomotor, conventions
 from procedures.servomotor.loads import load_index
 from procedures.shared.continued import half_of
 from procedures.shared.step_table import Labels, Read, Samples, StepTable, tabulate
 from procedures.torque_constant.fit import Steps, resting
 from procedures.torque_constant.plan import Plan
+from procedures.torque_constant.requires import channels
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
-
-
-def channels(machine: Servomotor) -> tuple[str, ...]:
-    """What is recorded while loads hang on the lever."""
-    return (ANGLE, *machine.segments, *machine.coils_of("xo", "yo"), STATUS)
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,8 @@ from procedures.shared.sines import known_frequency, unknown_frequency
 from procedures.tracking.drift import Drift, drift
 from procedures.tracking.estimates import TIMING_TICKS
 from procedures.tracking.plan import Plan
-from procedures.tracking.steps import Orbit, upper_and_lower
+from procedures.tracking.requires import upper_and_lower
+from procedures.tracking.steps import Orbit
 
 FATAL = (
     "stuck-channel",

@@ -13,7 +13,8 @@ from bench.uncertainty import Estimate, Influence
 from bench.uncertainty.series import SeriesMean, batch_means
 from procedures.shared.certificates import certified
 from procedures.tracking.ellipse import revolutions
-from procedures.tracking.steps import Orbit, upper_and_lower
+from procedures.tracking.requires import upper_and_lower
+from procedures.tracking.steps import Orbit
 
 APART = 5.0  # standard deviations of their difference, beyond which it is clear which of two is greater
 

@@ -14,7 +14,6 @@ from bench.errors import Lacking
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
@@ -29,10 +28,10 @@ from procedures.amb_rotor.geometry import nominal
 from procedures.amb_rotor.laws import of_laws
 from procedures.amb_rotor.machine import Law
 from procedures.shared import first_look
-from procedures.tracking import by_points, checks, estimates
-from procedures.tracking import figures as drawn
+from procedures.tracking import by_points
 from procedures.tracking.plan import Plan
-from procedures.tracking.steps import GROWN, ORBIT, START, STARTED, Orbit, channels, read_orbits
+from procedures.tracking.requires import requires
+from procedures.tracking.steps import GROWN, ORBIT, START, STARTED, Orbit, read_orbits
 
 PEAK = Quantity("error_peak", "m", "greatest error of the centre of mass in the mean revolution of the reference")
 PLANE = Quantity("error_peak_plane", "m", "as error_peak, at the sensor where it is greatest")
@@ -161,6 +160,8 @@ class Results:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     """Errors, tilts and distances of each law's orbit."""
+    from procedures.tracking import checks, estimates
+
     first_look.gate(recording, findings, wiring.before_orbits(recording))
     findings.gate(wiring.before_orbits(recording))
     plan, orbits = recording.plan, read_orbits(recording)
@@ -237,20 +238,10 @@ def _points(rig: RigFile, plan: Plan) -> Iterator[str]:
 
 def figures(results: Results, recording: Recording[Plan]) -> Iterable[Figure]:
     """Orbits with the ring, errors over time and over the reference's revolution, tilts, coil currents."""
+    from procedures.tracking import figures as drawn
+
     facts = {o.law: nominal(recording.rig, o.t_0) for o in results.orbits}
     return drawn.all_figures(results.orbits, facts)
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig's machine has."""
-    machine = conventions(rig)
-    whole = machine.stations.channels
-    by_path = machine.lacks if machine.can.path is not None else ()
-    return Requires(
-        channels=channels(machine), sensors=(*whole, *machine.currents), capabilities=("set_points",),
-        lacks=(*machine.stations.lacks, *machine.unmoved(("y", "z", "theta")), *by_path),
-        uses=("path", "settings.law", "settings.compensation", "model", "mark"),
-    )  # fmt: skip
 
 
 procedure = Procedure(

@@ -20,6 +20,7 @@ from procedures.amb_rotor.onset import onset, pushing
 from procedures.shared.sampled import of_telemetry
 from procedures.tracking.ellipse import Path, Wave
 from procedures.tracking.points import delay, read_points
+from procedures.tracking.requires import channels, upper_and_lower
 
 Array = npt.NDArray[np.float64]
 START, GROWN, ORBIT = "start", "grown", "orbit"
@@ -57,18 +58,6 @@ class Orbit:
         turning = f"{rpm:.0f} r/min" if self.path.turn_s else "at rest"
         figure = f"{w.hz:g} Hz" if w.ratio == 1 else f"{w.hz:g} Hz, {w.ratio} : 1"
         return f"{law}, {figure}, {w.y * 1e6:g} × {w.z * 1e6:g} µm, {turning}"
-
-
-def upper_and_lower(machine: AmbRotor) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Channels of the currents in the coils that carry the weight, and in those below."""
-    upper, lower = zip(*map(machine.pair, machine.axes), strict=True)
-    return upper, lower
-
-
-def channels(machine: AmbRotor) -> tuple[str, ...]:
-    """What is read of an orbit."""
-    upper, lower = upper_and_lower(machine)
-    return (*machine.stations.channels, *upper, *lower, *((SPEED,) if machine.speed_told else ()), STATUS)
 
 
 def sample_reference(rig: RigFile, hz: float, y: float, z: float, period_ns: int, ratio: int = 1) -> Wave:

@@ -12,7 +12,6 @@ from typing import Any
 from bench.figures import Shown
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
@@ -25,12 +24,12 @@ from procedures.shared import assumptions, first_look
 from procedures.synchronous import bearings, checks, dwelling, estimates, fitting, identified
 from procedures.synchronous.coil_peaks import find_uncertified
 from procedures.synchronous.default_speeds import within_envelope
-from procedures.synchronous.dwells import can_capture, read_dwells, required
+from procedures.synchronous.dwells import can_capture, read_dwells
 from procedures.synchronous.estimates import Results
 from procedures.synchronous.hum import listen, of_dwells
-from procedures.unbalance import figures as drawn
 from procedures.unbalance import sequence
 from procedures.unbalance.plan import Plan
+from procedures.unbalance.requires import requires
 
 COSINE = Quantity(
     "vector_cos",
@@ -112,11 +111,6 @@ def measured(results: Results) -> Iterator[Measured]:
                 yield known[name].measured(estimate, f"{place}, {result.dwell.where}" if place else result.dwell.where)
 
 
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig's machine has."""
-    return required(rig)
-
-
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
     yield from of_laws(conventions(rig), "law", [plan.law])
@@ -131,6 +125,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(results: Results, recording: Recording[Plan]) -> Iterable[Shown]:
     """Orbits of both planes, Bode pair, polar plot, full spectra, what the coils need."""
+    from procedures.unbalance import figures as drawn
+
     return drawn.all_figures(results, recording.rig)
 
 

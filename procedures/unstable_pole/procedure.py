@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import cycle, islice
+from typing import TYPE_CHECKING
 
 from bench.errors import BenchError
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
@@ -22,12 +22,13 @@ from bench.rigfile import RigFile
 from bench.rigfile.capture import rises
 from bench.rigfile.envelope import Envelope
 from procedures.shared import assumptions, planned
-from procedures.unstable_pole import checks, estimates
-from procedures.unstable_pole import figures as drawn
-from procedures.unstable_pole.estimates import Result
 from procedures.unstable_pole.hold import SPARE, ability, captured, chosen, foreseen, place, rate
 from procedures.unstable_pole.plan import Plan
-from procedures.unstable_pole.steps import STATE, STEP, read_taken
+from procedures.unstable_pole.requires import requires
+from procedures.unstable_pole.steps import STEP, read_taken
+
+if TYPE_CHECKING:
+    from procedures.unstable_pole.estimates import Result
 
 POLE = Quantity("pole", "1/s", "how fast both planes leave their place together, held currents: sqrt((K_1 + K_2)/m)",
                 title="unstable pole")  # fmt: skip
@@ -97,6 +98,8 @@ def _shot(rig: Rig, plan: Plan, record: Recorder, number: int, axis: str, push: 
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> list[Result]:
     """The pole of each axis."""
+    from procedures.unstable_pole import checks, estimates
+
     taken = read_taken(recording)
     findings.gate(checks.of_signals(taken, recording.rig, recording.plan))
     results, failed = estimates.results(taken, recording.rig, recording.plan)
@@ -113,6 +116,8 @@ def measured(results: Sequence[Result]) -> Iterator[Measured]:
 
 def figures(results: Sequence[Result], recording: Recording[Plan]) -> Iterable[Figure]:
     """Shots of each axis with their fit."""
+    from procedures.unstable_pole import figures as drawn
+
     del recording
     return drawn.all_figures(results)
 
@@ -151,22 +156,6 @@ def _caught(rig: RigFile, plan: Plan, axis: str) -> Iterator[str]:
     limit = rig.envelope.max_levitated_position_m
     if max(f.travel, f.at_bound) > limit:
         yield f"bound_m: a shot goes {max(f.travel, f.at_bound) * 1e6:.0f} µm; the envelope allows {limit * 1e6:g} µm"
-
-
-def requires(rig: RigFile) -> Requires:
-    """By the names that the rig has."""
-    if rig.capabilities.hold is None:
-        return Requires(capabilities=("hold",), capture=())
-    named = {probe.channel for probe in rig.probes.values()}
-    without = [c for axis in ability(rig).axes.values() for c in axis.positions if c not in named]
-    lacks = (f"probes: found none of {', '.join(without)}; expected where they are along the shaft",) if without else ()
-    return Requires(
-        channels=(STATE,),
-        capabilities=("hold",),
-        capture=captured(rig),
-        uses=("settings.observer", "motion"),
-        lacks=lacks,
-    )
 
 
 procedure = Procedure(

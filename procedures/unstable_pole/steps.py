@@ -9,11 +9,12 @@ import numpy.typing as npt
 
 from bench.recording import Recording, Step
 from bench.rigfile import RigFile
+from bench.rigfile.roles import STATE
 from procedures.unstable_pole.hold import ability, captured, currents
 from procedures.unstable_pole.plan import Plan
 
 Array = npt.NDArray[np.float64]
-STEP, STATE = "shot", "state"
+STEP = "shot"
 CAUGHT_S = 2e-3  # at a capture's end: where the shaft is then
 
 

@@ -25,7 +25,8 @@ from procedures.sine_following import checks
 from procedures.sine_following.estimates import Group, grouped, truly
 from procedures.sine_following.fit import followed, fundamental, largest, left_of, off_sine
 from procedures.sine_following.plan import Plan
-from procedures.sine_following.procedure import check, procedure, requires, waves
+from procedures.sine_following.procedure import check, procedure, waves
+from procedures.sine_following.requires import requires
 from procedures.sine_following.steps import Ride, modes_of
 from procedures.stages.tracks import Mode, Track
 from reports.figures import draw as draw_figure

@@ -12,7 +12,8 @@ from bench.rigfile import load_rig
 from procedures.servomotor.conventions import conventions
 from procedures.spindown import checks, estimates, fit
 from procedures.spindown.plan import Plan
-from procedures.spindown.steps import ANGLE_LAGS, SPEED_LAGS, RunDown, coils
+from procedures.spindown.requires import coils
+from procedures.spindown.steps import ANGLE_LAGS, SPEED_LAGS, RunDown
 
 MACHINE = conventions(load_rig("tsbs12"))
 J, COUNT = 0.033, 2 * np.pi / 4096

@@ -12,7 +12,8 @@ from scipy.integrate import solve_ivp
 from bench.rigfile import load_rig
 from procedures.servomotor.conventions import conventions
 from procedures.spindown import estimates, fit, waves
-from procedures.spindown.steps import SHORT_LAGS, SMALLEST_SAMPLES, RunDown, coils
+from procedures.spindown.requires import coils
+from procedures.spindown.steps import SHORT_LAGS, SMALLEST_SAMPLES, RunDown
 
 J, B, C, COUNT = 0.033, 8.0, 1.2, 2 * math.pi / 4096  # rad/s^2 of friction, 40 mN m
 WAVE = 0.12  # rad/s^2: 4 mN m
