@@ -51,20 +51,19 @@ COPIED = ("bench", "drivers", "procedures", "reports", "sim_backend", "rigs", "s
 
 
 LONG = (
-    "add-a-device", "adopt-a-calibration", "change-a-plan", "compare", "connect-a-rig", "first-calibration", "inject-faults",
-    "lift-off", "maximum-speed", "model", "run-a-campaign", "trend", "use-in-ci", "watch-a-run",
+    "add-a-device", "adopt-a-calibration", "amb-calibration", "angle-step", "balance", "bearing-model", "change-a-plan",
+    "coast-down", "compare", "compensation", "connect-a-rig", "current-step", "first-calibration", "force-constant",
+    "force-coupling", "inject-faults", "lift-off", "maximum-speed", "model", "negative-stiffness", "run-a-campaign", "run-up",
+    "sensitivity", "slew", "spindown", "step", "torque-constant", "tracking", "trend", "use-in-ci", "watch-a-run",
 )  # fmt: skip
-"""Pages that take long."""
+"""Pages that take long, or that only run a procedure: by default `tests/procedures` takes each through its whole path and
+draws its figures, and `tests/cli` the same commands with their reports and calibrations."""
 DRAWN = (
-    "actuator-constant", "amb-calibration", "angle-step", "axis-breakaway", "axis-friction", "axis-inertia", "balance",
-    "bearing-constant", "bearing-model", "coast-down", "cogging-map", "coil-map", "compensation", "current-step",
-    "emf-constant", "encoder-zero", "estimator-compare", "force-constant", "force-coupling", "force-map", "gate-margin",
-    "inductance-map", "load-balancing", "load-response", "loop-response", "map-zero", "mission", "negative-stiffness",
-    "positioning", "pull-ratio", "run-up", "runout-map", "sensitivity", "sensor-delay", "sine-following", "slew", "spindown",
-    "static-characteristics", "step", "step-following", "torque-constant", "tracking", "unbalance", "unstable-pole",
+    "actuator-constant", "axis-breakaway", "axis-friction", "bearing-constant", "cogging-map", "coil-map", "force-map",
+    "inductance-map", "load-balancing", "loop-response", "map-zero", "mission", "static-characteristics", "unbalance",
 )  # fmt: skip
-"""Pages that only run a procedure. `tests/procedures` takes each through its whole path, and draws the figures that the page's
-report would have; `make longer` executes the commands themselves."""
+"""Pages that only run a procedure, for a quarter of a minute and more. `tests/procedures` takes each through its whole path and
+draws the figures of its report; `make longer` executes the commands themselves."""
 
 
 def test_there_are_pages_to_execute() -> None:

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from bench import catalogue
-from bench.cli.loading import load_procedure
+from bench.cli.loading import load_procedure, requires_of
 from bench.procedure import Procedure
 from bench.rigfile import RigFile, load_rig
 from bench.rigfile.capabilities import parameters_named
@@ -162,6 +162,36 @@ def test_what_is_required_is_known_without_numerics() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == [str(len(catalogue.PROCEDURES))]
+
+
+def imported(code: str) -> set[str]:
+    """Modules of procedures that a fresh Python has after some code."""
+    code += "\nimport sys\nprint('\\n', *[name for name in sys.modules if name.startswith('procedures.')])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return set(done.stdout.splitlines()[-1].split())
+
+
+def test_what_a_procedure_needs_is_imported_without_the_procedure() -> None:
+    """`bench list --rig` asks 48 of them, and a rig can do a dozen."""
+    rooms = [entry.module.rpartition(".")[0] for entry in catalogue.PROCEDURES]
+    found = imported("\n".join(f"import {room}.requires" for room in rooms))
+    assert {f"{room}.requires" for room in rooms} <= found
+    assert not {f"{room}.procedure" for room in rooms} & found
+    assert {name for name in found if name.endswith((".estimates", ".checks", ".figures"))} == set()
+
+
+@pytest.mark.parametrize("entry", catalogue.PROCEDURES, ids=lambda entry: entry.name)
+def test_a_procedure_asks_for_what_its_room_says(entry: catalogue.Entry) -> None:
+    assert load_procedure(entry.name).requires is requires_of(entry)
+
+
+def test_a_listing_imports_no_evaluation_of_what_a_rig_lacks() -> None:
+    found = imported("import sys\nfrom bench.cli.abilities import abilities\nfrom bench.rigfile import load_rig\n"
+                     "abilities(load_rig('amb1dof'))")  # fmt: skip
+    lacking = {entry.module for entry in catalogue.PROCEDURES if entry.name not in OF["amb1dof"]}
+    assert not lacking & found
+    assert {f"procedures.{name.replace('-', '_')}.procedure" for name in OF["amb1dof"]} <= found
+    assert not {f"procedures.{name.replace('-', '_')}.figures" for name in OF["amb1dof"]} & found
 
 
 @pytest.mark.parametrize("name", ["unbalance", "run-up", "coast-down"])
