@@ -22,15 +22,12 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, interval, propagate
-from procedures.amb_calibration import both_coils, halves, hypotheses, turns
-from procedures.amb_calibration import by_angle as amb_calibration_by_angle
+from procedures.amb_calibration import turns
 from procedures.amb_calibration.hanging import exercised, hung_up_and_down, sequence
-from procedures.amb_calibration.hypotheses import Contradiction
 from procedures.amb_calibration.inputs import fit_inputs, hand_rad
 from procedures.amb_calibration.plan import FEWEST_MASSES, Plan
 from procedures.amb_calibration.pulls import Loaded, Pull, pulls
 from procedures.amb_calibration.requires import requires
-from procedures.amb_calibration.scatter import Scatter, covariance_by_angle, covariance_over_a_turn, outputs, scatter
 from procedures.amb_calibration.steps import Hang, HangingData, hung, read_hangings
 from procedures.servomotor.loads import check_masses
 from procedures.shared import assumptions, continued
@@ -39,6 +36,8 @@ from procedures.shared.weight import weight
 
 if TYPE_CHECKING:
     from procedures.amb_calibration.fit import Fit
+    from procedures.amb_calibration.hypotheses import Contradiction
+    from procedures.amb_calibration.scatter import Scatter
 
 K = Quantity("K", "N/A", "dF/di of a bearing's axis at zero control current, mean over a turn")
 K2 = Quantity("K2", "N/A^2", "(d²F/di²)/2 of a bearing's axis, mean over a turn")
@@ -100,7 +99,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> list[Analysis]:
 
 
 def _evaluated(recording: Recording[Plan], findings: Findings, pull: Pull, several: bool) -> Analysis:
-    from procedures.amb_calibration import checks
+    from procedures.amb_calibration import both_coils, checks, halves, hypotheses
 
     plan = recording.plan
     data = read_hangings(recording, pull)
@@ -131,6 +130,9 @@ def measured(parts: list[Analysis]) -> Iterator[Measured]:
 
 def _scattered(a: Analysis) -> dict[str, Estimate]:
     """Three quantities of each axis with the scatter of the hangings."""
+    from procedures.amb_calibration import by_angle as amb_calibration_by_angle
+    from procedures.amb_calibration.scatter import covariance_over_a_turn, outputs
+
     keys = a.fit.pull.keys
     terms = amb_calibration_by_angle.scatter_terms(
         a.identity, covariance_over_a_turn(a.spread), a.scatter.dof, keys=keys
@@ -141,6 +143,8 @@ def _scattered(a: Analysis) -> dict[str, Estimate]:
 def facts(parts: list[Analysis]) -> dict[str, Estimate]:
     """What was measured, and K, K2 and F0 of each axis at each angle, all with one scatter for each angle: what a later
     procedure takes at one angle and what it takes over a turn then stay correlated as they are."""
+    from procedures.amb_calibration import by_angle as amb_calibration_by_angle
+
     out: dict[str, Estimate] = {}
     for a in parts:
         keys = a.fit.pull.keys
@@ -159,7 +163,9 @@ def _fact(name: str, of: tuple[Loaded, ...]) -> str:
 
 def _fitted(recording: Recording[Plan], data: HangingData) -> Analysis:
     from procedures.amb_calibration import fit as amb_calibration_fit
+    from procedures.amb_calibration import hypotheses
     from procedures.amb_calibration.estimates import less_sure, turned_by_hand, turning_point, unresolved_angles
+    from procedures.amb_calibration.scatter import covariance_by_angle, outputs, scatter
 
     plan, rig = recording.plan, recording.rig
     inputs = fit_inputs(rig, plan.masses, data.hangings.pull)

@@ -17,7 +17,6 @@ from bench.rigfile.roles import Status
 from bench.rigfile.supports import two_planes
 from procedures.amb_calibration.plan import Plan
 from procedures.amb_calibration.pulls import pulls, unloaded
-from procedures.amb_calibration.steps import Hang
 from procedures.shared.signals import Meaning
 
 FEWEST = 8  # angles of a mean over a turn: orders up to four are resolved
@@ -101,6 +100,8 @@ def findings(recording: Recording[Plan]) -> Iterator[Finding]:
 
 
 def _uneven(recording: Recording[Any]) -> Iterator[Finding]:
+    from procedures.amb_calibration.steps import Hang
+
     stood = sorted({float(step.labels["angle_rad"]) % (2 * math.pi) for step in recording.steps(Hang.kind)})
     if len(stood) < 2:
         return

@@ -25,6 +25,7 @@ import numpy.typing as npt
 from bench.errors import AnalysisError
 from bench.rigfile.numbers import Sum
 from procedures.amb_rotor.conventions import AMB_ROTOR
+from procedures.amb_rotor.keys import gap_key, number_key
 from procedures.amb_rotor.machine import AmbRotor
 from procedures.amb_rotor.stations import Placed, row, upward
 from procedures.shared import leastsquares
@@ -138,17 +139,6 @@ def _currents(d: Positions, p: Numbers, axes: Sequence[str]) -> tuple[Array, Arr
         for s, c in (("p", d.p), ("n", d.n))
     )
     return pos, neg
-
-
-def number_key(identity: str) -> str:
-    """Under which a number of the rig file's tables goes among the inputs."""
-    return f"number {identity}"
-
-
-def gap_key(machine: AmbRotor, axis: str) -> str:
-    """Under which an axis' gap goes among the inputs: one that all share is "gap"."""
-    shared = {t.identity for t in machine.stations.gaps.values()}
-    return "gap" if len(shared) < 2 else number_key(machine.stations.gaps[axis].identity)
 
 
 def magnet(beta: float, offset: float, gap: float, r: Array, p: Array, n: Array) -> Array:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +19,6 @@ from bench.rigfile import RigFile
 from bench.uncertainty import propagate_stacked
 from bench.units import RPM
 from procedures.amb_rotor.conventions import conventions
-from procedures.balance.estimates import Balanced
 from procedures.balance.plan import Plan
 from procedures.balance.planes import Plane, names_of, planes_of
 from procedures.balance.solution import Trials
@@ -26,6 +26,9 @@ from procedures.balance.steps import Read, Run, Weight
 from procedures.synchronous import bearings, facts, runout
 from procedures.synchronous.bearings import Known
 from procedures.synchronous.runout import Stand
+
+if TYPE_CHECKING:
+    from procedures.balance.estimates import Balanced
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]

@@ -19,8 +19,8 @@ from bench.units import RPM
 from procedures.amb_rotor import lift, pushes, wiring
 from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.laws import of_laws
-from procedures.balance import checks, decision, sequence
-from procedures.balance.hum import of_balance
+from procedures.balance import decision, sequence
+from procedures.balance.fitting import of_plan
 from procedures.balance.plan import Plan
 from procedures.balance.planes import names_of
 from procedures.balance.requires import requires
@@ -103,8 +103,9 @@ def fewest_steps(plan: Plan) -> int:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     """Unbalance as found and as left, and the influence coefficients at the highest speed."""
-    from procedures.balance import estimates
+    from procedures.balance import checks, estimates
     from procedures.balance.estimates import Result
+    from procedures.balance.hum import of_balance
 
     first_look.gate(recording, findings, wiring.before_orbits(recording))
     findings.gate([*wiring.before_orbits(recording), *dwell_checks.before(recording), *checks.refusals(recording)],
@@ -157,7 +158,7 @@ def measured(result: Result) -> Iterator[Measured]:
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
     yield from of_laws(conventions(rig), "law", [plan.law])
-    yield from checks.of_plan(rig, plan)
+    yield from of_plan(rig, plan)
 
 
 def figures(result: Result, recording: Recording[Plan]) -> Iterable[Shown]:

@@ -24,7 +24,8 @@ import numpy.typing as npt
 from bench.errors import AnalysisError
 from bench.uncertainty import Estimate
 from procedures.amb_rotor import magnetics
-from procedures.amb_rotor.magnetics import Positions, gap_key
+from procedures.amb_rotor.keys import gap_key
+from procedures.amb_rotor.magnetics import Positions
 from procedures.shared.leastsquares import Fit
 from procedures.shared.type_a import scatter
 

@@ -9,6 +9,7 @@ import numpy as np
 from bench.findings import Effect, Finding
 from bench.uncertainty import Estimate, Influence, coverage_factor, welch_satterthwaite
 from procedures.amb_rotor import magnetics
+from procedures.amb_rotor.keys import gap_key
 from procedures.amb_rotor.machine import AmbRotor
 from procedures.amb_rotor.places import Held
 from procedures.bearing_model.estimates import Analysis
@@ -105,7 +106,7 @@ def _compare(a: Analysis) -> Finding:
     """The linear model's two numbers beside the bearing's slopes, and the noise under both residual sums."""
     said = []
     for axis, f in a.fits.items():
-        gap = a.adjusted.values[magnetics.gap_key(a.held.machine, axis)]
+        gap = a.adjusted.values[gap_key(a.held.machine, axis)]
         one, two = f.linear.terms
         true = "true slopes not told without a bias"
         if axis in a.bias_A:
@@ -149,7 +150,7 @@ def _adjustments(a: Analysis, plan: Plan) -> Iterator[Finding]:
             doubted = (f"beta_{axis}", f"offset_{axis}", f"misfit_ratio@{place}", f"misfit_ratio_means@{place}")
             yield Finding("misfit", text, axis, Effect.INDETERMINATE, doubted)
     told = []
-    for key in dict.fromkeys(magnetics.gap_key(a.held.machine, axis) for axis in a.held.machine.axes):
+    for key in dict.fromkeys(gap_key(a.held.machine, axis) for axis in a.held.machine.axes):
         gap, drawing = a.adjusted.estimates[key], a.inputs[key]
         name = "gap" if key == "gap" else influence(a, key).name
         told.append(f"{name} {gap.value * 1e6:.1f} ± {expanded(gap) * 1e6:.1f} µm "

@@ -17,8 +17,9 @@ import numpy.typing as npt
 
 from bench.uncertainty import Estimate, Influence
 from procedures.amb_rotor import magnetics
+from procedures.amb_rotor.keys import gap_key
 from procedures.amb_rotor.machine import AmbRotor
-from procedures.amb_rotor.magnetics import AxisFit, Statics, gap_key
+from procedures.amb_rotor.magnetics import AxisFit, Statics
 from procedures.amb_rotor.places import Held
 
 Array = npt.NDArray[np.float64]

@@ -13,8 +13,9 @@ import numpy.typing as npt
 from bench.recording import Recording
 from bench.uncertainty import Estimate
 from procedures.amb_rotor import magnetics
+from procedures.amb_rotor.keys import gap_key
 from procedures.amb_rotor.machine import AmbRotor
-from procedures.amb_rotor.magnetics import AxisFit, Statics, gap_key
+from procedures.amb_rotor.magnetics import AxisFit, Statics
 from procedures.amb_rotor.places import Held
 from procedures.bearing_model import comparison
 from procedures.bearing_model.adjustment import Adjusted, adjust

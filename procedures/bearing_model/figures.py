@@ -12,6 +12,7 @@ from bench.figures import Figure, Series
 from bench.rigfile import RigFile
 from procedures.amb_rotor import magnetics
 from procedures.amb_rotor.geometry import Edge, at_rings, nominal
+from procedures.amb_rotor.keys import gap_key
 from procedures.bearing_model.checks import influence
 from procedures.bearing_model.estimates import Analysis
 
@@ -82,7 +83,7 @@ def _forces(a: Analysis) -> Figure:
     f = a.fits[axis]
     r = np.linspace(float(a.compared.r[k].min()), float(a.compared.r[k].max()), 60)
     both = np.full_like(r, bias)
-    pull = magnetics.magnet(f.beta, f.offset, a.adjusted.values[magnetics.gap_key(a.held.machine, axis)], r, both, both)
+    pull = magnetics.magnet(f.beta, f.offset, a.adjusted.values[gap_key(a.held.machine, axis)], r, both, both)
     series = (
         Series("nonlinear, no control current", 1e6 * r, pull),
         Series("linear, no control current", 1e6 * r, f.linear.terms[1] * r),

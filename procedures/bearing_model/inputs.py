@@ -10,9 +10,9 @@ from bench.rigfile.places import CENTRE, PlaceError, Places
 from bench.rigfile.toleranced import Toleranced
 from bench.uncertainty import Estimate
 from procedures.amb_rotor.conventions import conventions
+from procedures.amb_rotor.keys import gap_key, number_key
 from procedures.amb_rotor.lengths import in_words, lengths_by_name, named, summed
 from procedures.amb_rotor.machine import AmbRotor
-from procedures.amb_rotor.magnetics import gap_key, number_key
 from procedures.amb_rotor.stations import stated
 from procedures.shared.certificates import certified
 

@@ -24,8 +24,6 @@ from bench.rigfile import RigFile
 from procedures.amb_rotor import frame, lift, liftable, pushes, rings
 from procedures.amb_rotor.conventions import AMB_ROTOR, conventions
 from procedures.amb_rotor.places import HOLD, LIFT, LIFT_LOST, REST, TILT, Held, of_readings, read_steps
-from procedures.bearing_model import wiring
-from procedures.bearing_model.comparison import COMPARED
 from procedures.bearing_model.fitting import check
 from procedures.bearing_model.grid import biases, count_places, places, tilts
 from procedures.bearing_model.inputs import as_printed
@@ -159,6 +157,8 @@ def _of_first(
     rig: RigFile, plan: Plan, held: Sequence[Mapping[str, float]], tilted: Sequence[Mapping[str, float]]
 ) -> list[Finding]:
     """What the positions at the first bias show of the wiring, by what was read in each."""
+    from procedures.bearing_model import wiring
+
     (y, z), (psi, theta) = zip(*places(rig, plan), strict=True), zip(*tilts(plan), strict=True)
     machine = conventions(rig)
     first = of_readings({"y_m": y, "z_m": z}, held, machine)
@@ -201,6 +201,8 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
 
 def measured(a: Analysis) -> Iterator[Measured]:
     """Each axis, then the comparison of each AMB."""
+    from procedures.bearing_model.comparison import COMPARED
+
     for axis in a.held.machine.axes:
         for name, quantity in (BY_AXIS if axis in AMB_ROTOR.axes else {**BY_AXIS, **SLOPES}).items():
             if f"{name}_{axis}" in a.estimates:
@@ -211,7 +213,7 @@ def measured(a: Analysis) -> Iterator[Measured]:
 
 
 def _of_data(recording: Recording[Plan], held: Held, tilted: Held) -> Iterator[Finding]:
-    from procedures.bearing_model import checks
+    from procedures.bearing_model import checks, wiring
 
     plan, rig = recording.plan, recording.rig
     found = [*checks.of_signals(held, tilted, plan), *wiring.of_wiring(held, tilted, rig)]

@@ -14,8 +14,9 @@ from bench.findings import Effect, Finding
 from bench.rigfile import RigFile
 from procedures.amb_rotor import magnetics
 from procedures.amb_rotor.conventions import conventions
+from procedures.amb_rotor.keys import gap_key
 from procedures.amb_rotor.machine import AmbRotor
-from procedures.amb_rotor.magnetics import Positions, Statics, gap_key
+from procedures.amb_rotor.magnetics import Positions, Statics
 from procedures.amb_rotor.places import Held
 from procedures.bearing_model.estimates import find_unloaded
 from procedures.bearing_model.inputs import fit_inputs

@@ -24,7 +24,6 @@ from bench.units import RPM
 from procedures.amb_rotor import lift, pushes
 from procedures.amb_rotor.conventions import conventions
 from procedures.compensation import switching
-from procedures.compensation.hum import of_switch
 from procedures.compensation.plan import Plan
 from procedures.compensation.requires import requires
 from procedures.compensation.switching import SWITCH, Switched
@@ -106,6 +105,7 @@ class Compared:
 def evaluate(recording: Recording[Plan], findings: Findings) -> Compared:
     """The dwells as in `unbalance`, the reductions, and the switch where it was captured."""
     from procedures.compensation import checks
+    from procedures.compensation.hum import of_switch
 
     results = unbalance.evaluate(recording, findings)
     reductions = checks.reductions(results)

@@ -19,7 +19,7 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.capture import Layout
-from procedures.derivative import checks
+from procedures.derivative.fitting import lines_clear
 from procedures.derivative.plan import Plan
 from procedures.derivative.requires import requires
 from procedures.derivative.steps import LINE, OFFSET, QUIET, asked, read_taken
@@ -97,7 +97,7 @@ def _take(
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     """The estimator's response at each line, and what it is beside that of the weights."""
-    from procedures.derivative import estimates, fit
+    from procedures.derivative import checks, estimates, fit
 
     plan, taken = recording.plan, read_taken(recording)
     known_hz = conventions(recording.rig).known(recording.rig, "harmonic_hz")
@@ -143,7 +143,7 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     ):
         yield f"lines_hz: found {plan.lines_hz}; expected above 0, each once, in order, up to {0.4 / tick_s:g} Hz"
     else:
-        yield from checks.lines_clear(plan, machine.known(rig, "harmonic_hz"))
+        yield from lines_clear(plan, machine.known(rig, "harmonic_hz"))
     room = rig.capture.memory_bytes / Layout.of(rig.capture, machine.captured).sample.itemsize * tick_s
     if (longest := seconds(plan, min(plan.lines_hz, default=1.0))) > room:
         yield f"lines_hz: {min(plan.lines_hz):g} Hz takes {longest:.3g} s; the controller's memory holds {room:.3g} s"

@@ -22,7 +22,7 @@ from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
 from procedures.force_map import fit as force_map_fit
 from procedures.force_map import selection as force_map_selection
-from procedures.force_map.fit import FORCE_TERMS, Identifiability, Points
+from procedures.force_map.fit import CROSS, FORCE_TERMS, Identifiability, Points
 from procedures.force_map.requires import positions
 from procedures.force_map.selection import Selection
 from procedures.force_map.steps import MapData
@@ -32,7 +32,6 @@ from procedures.shared import leastsquares, type_a
 from procedures.shared.certificates import certified, certified_gain, certified_sensors
 
 Array = npt.NDArray[np.float64]
-CROSS = "cross"
 QUADRATURE = ("ripple_y", "ripple_x")
 TERMS = (*FORCE_TERMS, CROSS, *QUADRATURE)
 SCALE = dict.fromkeys(TERMS, 1.0) | {"alpha_4": 1e3, "alpha_5": 1e5, "alpha_8": 1e2, "alpha_9": 1e2}

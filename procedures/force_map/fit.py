@@ -23,6 +23,8 @@ import numpy.typing as npt
 from bench.errors import AnalysisError
 from procedures.shared.leastsquares import linear
 
+CROSS = "cross"
+
 Array = npt.NDArray[np.float64]
 
 UNITS = {

@@ -24,8 +24,8 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from procedures.force_map import estimates, steps
-from procedures.force_map.estimates import CROSS, Result
-from procedures.force_map.fit import ABOUT, UNITS
+from procedures.force_map.estimates import Result
+from procedures.force_map.fit import ABOUT, CROSS, UNITS
 from procedures.force_map.plan import Plan
 from procedures.force_map.requires import requires
 from procedures.force_map.steps import AtPoint, MapData, read_points

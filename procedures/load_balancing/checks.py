@@ -10,9 +10,18 @@ import numpy as np
 from bench.findings import Effect, Finding
 from bench.uncertainty import Estimate, coverage_factor
 from procedures.load_balancing import fit, inputs
-from procedures.load_balancing.estimates import FACTS_SEEN, LOADS_SEEN, Result, Turns, loads_of
+from procedures.load_balancing.estimates import Result, Turns, loads_of
 from procedures.load_balancing.plan import Plan
-from procedures.load_balancing.steps import AFTER, BEFORE, Around, Complex, mean_currents, of_way
+from procedures.load_balancing.steps import (
+    AFTER,
+    BEFORE,
+    FACTS_SEEN,
+    LOADS_SEEN,
+    Around,
+    Complex,
+    mean_currents,
+    of_way,
+)
 from procedures.servomotor import checks
 from procedures.servomotor.conventions import Servomotor
 from procedures.shared.gradients import linearised

@@ -15,13 +15,12 @@ from bench.uncertainty.estimate import Deviations, merged
 from procedures.load_balancing import fit, inputs
 from procedures.load_balancing.fit import Law
 from procedures.load_balancing.plan import Plan
-from procedures.load_balancing.steps import AFTER, BEFORE, Around, mean_currents, of_way
+from procedures.load_balancing.steps import AFTER, BEFORE, FACTS_SEEN, LOADS_SEEN, Around, mean_currents, of_way
 from procedures.shared.gradients import linearised
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 Numbers = Mapping[str, float]
-LOADS_SEEN, FACTS_SEEN = "from the loads", "from the facts"
 LINEAR = ("peak_i_y/before", "peak_i_y/after", "reduction", f"predicted/{LOADS_SEEN}", f"predicted/{FACTS_SEEN}")
 RIPPLE = 0.025  # of the force with 16 times the angle, T (5.25)
 ROUNDING = Influence(

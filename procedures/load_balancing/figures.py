@@ -8,8 +8,9 @@ import numpy as np
 
 from bench.figures import Figure, Series
 from procedures.load_balancing import fit
-from procedures.load_balancing.estimates import LOADS_SEEN, Result, Turns, loads_of
+from procedures.load_balancing.estimates import Result, Turns, loads_of
 from procedures.load_balancing.plan import Plan
+from procedures.load_balancing.steps import LOADS_SEEN
 
 Array = fit.Array
 

@@ -22,10 +22,10 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from procedures.load_balancing import estimates, inputs
-from procedures.load_balancing.estimates import FACTS_SEEN, LOADS_SEEN, Result
+from procedures.load_balancing.estimates import Result
 from procedures.load_balancing.plan import Plan
 from procedures.load_balancing.requires import requires
-from procedures.load_balancing.steps import AFTER, BEFORE, STEP, read_around
+from procedures.load_balancing.steps import AFTER, BEFORE, FACTS_SEEN, LOADS_SEEN, STEP, read_around
 from procedures.servomotor import carrying, hold, segments, wiring
 from procedures.servomotor.conventions import LOADS, PHASE, conventions
 from procedures.servomotor.direction import of_probe

@@ -16,6 +16,8 @@ from procedures.load_balancing.plan import Plan
 from procedures.load_balancing.requires import channels, positions
 from procedures.servomotor.conventions import LOADS, PHASE, conventions
 
+LOADS_SEEN, FACTS_SEEN = "from the loads", "from the facts"
+
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 STEP, BEFORE, AFTER = "circle", "before", "after"

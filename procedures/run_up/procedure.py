@@ -24,7 +24,7 @@ from procedures.amb_rotor import lift, pushes, wiring
 from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.laws import of_laws
 from procedures.amb_rotor.lift import NO_SPEED
-from procedures.run_up import checks
+from procedures.run_up.fitting import of_plan
 from procedures.run_up.plan import Passing, Plan
 from procedures.run_up.requires import requires
 from procedures.run_up.steps import MISSED, PASSAGE, read_passage
@@ -176,7 +176,7 @@ def _fetch(rig: Rig, plan: Passing, record: Recorder, speed: float) -> None:
 
 def evaluate(recording: Recording[Any], findings: Findings) -> Run:
     """The passage's curves with their criticals, and the vectors at the captures' speeds."""
-    from procedures.run_up import estimates
+    from procedures.run_up import checks, estimates
 
     first_look.gate(recording, findings, wiring.before_orbits(recording))
     findings.gate([*wiring.before_orbits(recording), *checks.before(recording)])
@@ -219,7 +219,7 @@ def check(rig: RigFile, plan: Passing) -> Iterable[str]:
     """What cannot work before anything starts."""
     lacking = [f"parameters: the rig has no {name}" for name in plan.parameters if name not in rig.parameters]
     yield from of_laws(conventions(rig), "law", [plan.law])
-    yield from lacking or checks.of_plan(rig, plan)
+    yield from lacking or of_plan(rig, plan)
 
 
 def figures(run: Run, recording: Recording[Any]) -> Iterable[Shown]:

@@ -27,7 +27,7 @@ from bench.rigfile.envelope import Envelope
 from procedures.shared import continued
 from procedures.stages import assumptions
 from procedures.stages.stators import axis, phases
-from procedures.static_characteristics import checks, halves
+from procedures.static_characteristics import checks
 from procedures.static_characteristics.beside import Beside, by_flux, of_controller
 from procedures.static_characteristics.places import SIDES, Load, grid, loads, repeated
 from procedures.static_characteristics.plan import Plan
@@ -140,7 +140,7 @@ def _read(
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     """Loads, and the map that fits them."""
-    from procedures.static_characteristics import estimates
+    from procedures.static_characteristics import estimates, halves
 
     rig, plan, taken = recording.rig, recording.plan, read_taken(recording)
     findings.gate(checks.of_signals(taken, rig, plan))

@@ -24,7 +24,7 @@ from bench.units import RPM
 from procedures.amb_rotor import frame, lift
 from procedures.amb_rotor.conventions import conventions
 from procedures.shared import assumptions
-from procedures.step import capturing, hum, planes, slewing
+from procedures.step import capturing
 from procedures.step.plan import Plan
 from procedures.step.position import leans
 from procedures.step.record_length import enough_s, faded_s
@@ -174,7 +174,7 @@ class Results:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     """The response of each case, and what the cases of an axis have in common."""
-    from procedures.step import checks, estimates
+    from procedures.step import checks, estimates, hum, planes, slewing
 
     before = list(checks.before(recording))
     findings.gate(before)

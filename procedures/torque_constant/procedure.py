@@ -32,7 +32,7 @@ from procedures.servomotor.parameters import BIASES, CURRENTS, named, stated, wr
 from procedures.shared import assumptions, continued, first_look
 from procedures.shared.continued import Done
 from procedures.shared.step_table import of_samples, record_step
-from procedures.torque_constant import checks, halves
+from procedures.torque_constant import checks
 from procedures.torque_constant.inputs import arms_u, fit_inputs, masses_u
 from procedures.torque_constant.plan import Plan
 from procedures.torque_constant.requires import requires
@@ -188,6 +188,8 @@ class Analysis:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     """The balance of torques, with its fit and estimates."""
+    from procedures.torque_constant import halves
+
     findings.gate([*of_probe(recording), *checks.of_events(recording)])
     plan, machine = recording.plan, conventions(recording.rig)
     first_look.gate(recording, findings, _sideways(recording))
