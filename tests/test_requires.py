@@ -185,6 +185,19 @@ def test_a_procedure_asks_for_what_its_room_says(entry: catalogue.Entry) -> None
     assert load_procedure(entry.name).requires is requires_of(entry)
 
 
+def test_a_room_of_one_file_says_by_its_procedure_what_it_needs(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """As the guide's has no `requires.py`."""
+    (tmp_path / "of_one_file").mkdir()
+    (tmp_path / "of_one_file" / "procedure.py").write_text(
+        "from procedures.step.procedure import procedure as procedure\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    entry = catalogue.Entry("of-one-file", "of_one_file.procedure", "a step")
+    assert requires_of(entry) is load_procedure("step").requires
+
+
 def test_a_listing_imports_no_evaluation_of_what_a_rig_lacks() -> None:
     found = imported("import sys\nfrom bench.cli.abilities import abilities\nfrom bench.rigfile import load_rig\n"
                      "abilities(load_rig('amb1dof'))")  # fmt: skip

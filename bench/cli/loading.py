@@ -10,6 +10,7 @@ from __future__ import annotations
 import ast
 import hashlib
 import importlib
+import importlib.util
 import os
 import re
 import sys
@@ -87,10 +88,12 @@ def of_entry(entry: catalogue.Entry) -> Procedure:
 
 
 def requires_of(entry: catalogue.Entry) -> Callable[[RigFile], Requires]:
-    """What a procedure of ours needs of a rig: the room's `requires`, without the procedure, which takes longer to import."""
-    found: Callable[[RigFile], Requires] = importlib.import_module(
-        f"{entry.module.rpartition('.')[0]}.requires"
-    ).requires
+    """What a procedure of ours needs of a rig: by its room's `requires.py`, where it has one, without the procedure, which
+    takes longer to import."""
+    room = entry.module.rpartition(".")[0]
+    if not room or importlib.util.find_spec(f"{room}.requires") is None:
+        return of_entry(entry).requires
+    found: Callable[[RigFile], Requires] = importlib.import_module(f"{room}.requires").requires
     return found
 
 

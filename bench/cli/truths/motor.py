@@ -25,9 +25,8 @@ def spindown(done: Simulated) -> Found:
 
 def circle(done: Simulated) -> Found:
     from procedures.load_balancing import inputs
-    from procedures.load_balancing.estimates import FACTS_SEEN, LOADS_SEEN
     from procedures.load_balancing.procedure import ramp_s
-    from procedures.load_balancing.steps import AFTER, BEFORE, of_way, read_around
+    from procedures.load_balancing.steps import AFTER, BEFORE, FACTS_SEEN, LOADS_SEEN, of_way, read_around
     from procedures.servomotor import wiring
     from procedures.servomotor.parameters import chosen, named
     from sim_backend.motion import CircleAsked
