@@ -134,6 +134,7 @@ def _bound(native: RigFile, toml: str, called: Mapping[str, str], replies: bool)
         at, end, plans = (toml.index(f"\n[{name}") for name in ("parameters]", "capture]", "plans"))
         asked = re.sub(r"\{ index = (\d+)", lambda m: f'{{ signal = "{numbers[int(m[1])]}"', toml[at:end])
         toml = toml[:at] + asked + toml[plans:]  # captures are messages of the protocol, with replies
+        toml = re.sub(r"(?m)^asked = .*\n", "", toml)  # of a motor: what captures alone show
         toml = re.sub(r"protocol = 1\nmap_version = 2\n", "", toml)
         binding.append("[devices.controller.binding.commands]")
         for command, on in LEVELS.items():

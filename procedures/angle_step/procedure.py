@@ -45,7 +45,7 @@ BOUND = Quantity("bound_excess", "A", "greatest torque current beyond what force
 CAPTURED = (AMPLITUDE, BOUND)
 MEASURES = (RISE, OVERSHOOT, SETTLING, FINAL, PEAK, EXCESS, SATURATED, *CAPTURED)
 TORQUE_CONSTANT = 2.87  # N m/A, T Table 6.2; for predictions before a run, and for nothing that is measured
-UPLOAD_S = 0.5  # what the upload of a capture is given at least
+UPLOAD_S = 0.6  # what the upload of a capture is given at least, by whatever link
 CODES = {"static": 0.0, "priority": 1.0}
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from bench.errors import AnalysisError
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
 from procedures.emf_constant import fit
@@ -60,6 +61,10 @@ def _repeats(taken: Sequence[Taken], motor: str, winding: Winding, plan: Plan) -
 
 def _result(winding: Winding, each: Sequence[Rows], rig: RigFile) -> Result:
     repeats = [fit.flux(rows) for rows in each]
+    if not all(f.size > 0 for f in repeats):
+        raise AnalysisError(
+            f"{winding.motor}: voltages and currents of its coils are 0 throughout; its flux cannot be told"
+        )
     whole = fit.flux(fit.together(each))
     by_coil = np.array([fit.by_coil(rows, f) for rows, f in zip(each, repeats, strict=True)])
     found = {"flux": _flux(winding, repeats, whole, rig), "resistance": _resistance(winding, repeats, rig)}

@@ -20,6 +20,8 @@ from bench.rigfile import RigFile, load_rig
 from drivers.controller import Controller
 from drivers.reception import open_reception
 
+FULL = ("current-step", "coil-map", "loop-response", "emf-constant")
+"""What the current loops matter to; the reduced model has none, and no voltages."""
 PORTS = ("--link", "controller=cli:socket://127.0.0.1:0", "--link", "operator=line:127.0.0.1:0")
 KINDS = ("cli:socket", "cli:pty")
 WIRE_S = 52 * 2 * 17_500 * 10 / 3e6  # of half a second of 52 channels at 35 kHz, at 3 MBd
@@ -106,7 +108,7 @@ def listening(folder: Path, url: str) -> Callable[[], list[tuple[float, float]]]
 def test_procedures_over_the_command_line(tmp_path: Path, rig_name: str, procedure: str, plan: tuple[str, ...]) -> None:
     """Each against a served rig, as processes: what is measured holds what the machine was drawn with."""
     arguments = tuple(x for one in plan for x in ("--plan", one))
-    reduced = int(procedure not in ("current-step", "coil-map", "loop-response"))  # which the current loops matter to
+    reduced = int(procedure not in FULL)
     with processes.served(tmp_path, "--seed", "3", "--truth", f"reduced={reduced}", rig=rig_name, ports=PORTS) as rig:
         with processes.real_bench(
             tmp_path, "run", procedure, "--rig", rig_name, "--backend", "live", "--operator", "auto", "--no-report",
