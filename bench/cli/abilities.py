@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 
 from bench import catalogue
@@ -13,7 +13,7 @@ from bench.errors import ConfigError, Lacking, Problem
 from bench.procedure import BenchPlan, Procedure
 from bench.procedure.plans import assemble
 from bench.procedure.requires import lacking
-from bench.record.specs import load_spec
+from bench.record.specs import limited, load_spec
 from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
 
@@ -45,29 +45,27 @@ def abilities(rig: RigFile, only: str = "") -> list[Ability]:
     """
     if only:
         return [_ability(rig, load_procedure(only))]
-    twice = dict(catalogue.taken_twice())
-    able = [_of_entry(rig, entry) for entry in catalogue.procedures() if entry.name not in twice]
+    twice, stated = dict(catalogue.taken_twice()), _stated(rig)
+    able = [_of_entry(rig, entry, stated) for entry in catalogue.procedures() if entry.name not in twice]
     return [*able, *(Ability(name, unfit=(why,)) for name, why in twice.items())]
 
 
-def _of_entry(rig: RigFile, entry: catalogue.Entry) -> Ability:
+def _of_entry(rig: RigFile, entry: catalogue.Entry, stated: Collection[str]) -> Ability:
     if entry.point is None:
         missing = lacking(requires_of(entry), rig)
-        return (
-            Ability(entry.name, missing) if missing and not _stated(rig, entry.name) else _ability(rig, of_entry(entry))
-        )
+        return Ability(entry.name, missing) if missing and entry.name not in stated else _ability(rig, of_entry(entry))
     try:
         return _ability(rig, of_entry(entry))
     except ConfigError as error:
         return Ability(entry.name, unfit=(str(error),))
 
 
-def _stated(rig: RigFile, procedure: str) -> bool:
-    """Whether the rig file or its limits say something of a procedure, which is then held against the procedure itself."""
+def _stated(rig: RigFile) -> Collection[str]:
+    """Procedures of which the rig file or its limits say something: that is held against the procedure itself."""
     try:
-        return procedure in rig.plans or bool(load_spec(rig.name, procedure))
-    except ConfigError:
-        return True
+        return {*rig.plans, *limited(rig.name)}
+    except ConfigError:  # that each of them tells
+        return {entry.name for entry in catalogue.procedures()}
 
 
 def _ability(rig: RigFile, procedure: Procedure) -> Ability:

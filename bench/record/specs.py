@@ -122,6 +122,15 @@ def _by_names(limits: Mapping[str, Limit], rig: RigFile, key: str, path: str) ->
     return by_names(rig.aliases, limits)
 
 
+def limited(rig_name: str, folders: Collection[Path] | None = None) -> Collection[str]:
+    """Procedures, by name, that a rig's spec file has limits for.
+
+    Raises:
+        ConfigError: the file cannot be used.
+    """
+    return _read(rig_name, folders, None)[1].keys()
+
+
 def misnamed(rig_name: str, folders: Collection[Path] | None = None, *, file: Path | None = None) -> Iterator[Problem]:
     """Tables of limits whose name is nearly a procedure's: each would be void in silence. What is like none of them may be for
     a procedure of another laboratory.
