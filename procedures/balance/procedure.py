@@ -27,10 +27,8 @@ from procedures.balance.requires import requires
 from procedures.balance.steps import BASE, known_by, read_runs
 from procedures.shared import assumptions, first_look
 from procedures.synchronous import bearings, dwelling
-from procedures.synchronous import checks as dwell_checks
 from procedures.synchronous.default_speeds import within_envelope
 from procedures.synchronous.dwells import SLOW
-from procedures.synchronous.hum import listen
 
 if TYPE_CHECKING:
     from procedures.balance.estimates import Result
@@ -106,6 +104,8 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     from procedures.balance import checks, estimates
     from procedures.balance.estimates import Result
     from procedures.balance.hum import of_balance
+    from procedures.synchronous import checks as dwell_checks
+    from procedures.synchronous.hum import listen
 
     first_look.gate(recording, findings, wiring.before_orbits(recording))
     findings.gate([*wiring.before_orbits(recording), *dwell_checks.before(recording), *checks.refusals(recording)],

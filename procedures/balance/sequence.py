@@ -13,7 +13,7 @@ from bench.recording.recorder import Recorder
 from bench.rigfile.roles import STATUS
 from procedures.amb_rotor import lift
 from procedures.amb_rotor.conventions import conventions
-from procedures.balance import decision, estimates
+from procedures.balance import decision
 from procedures.balance.plan import Plan
 from procedures.balance.planes import names_of
 from procedures.balance.steps import (
@@ -204,6 +204,8 @@ def _has_acted(work: Work, plane: int) -> bool:
 
 def _correct(work: Work) -> None:
     """Corrections, each with its verification run, until it is reached or the plan allows no more."""
+    from procedures.balance import estimates
+
     rig, plan = work.rig.file, work.plan
     trials = decision.trials_of(work.runs, rig)
     assert trials is not None

@@ -29,14 +29,13 @@ from procedures.compensation.requires import requires
 from procedures.compensation.switching import SWITCH, Switched
 from procedures.shared import assumptions
 from procedures.synchronous import bearings, dwelling
-from procedures.synchronous.estimates import Results
-from procedures.synchronous.hum import listen
 from procedures.unbalance import figures as unbalance_figures
 from procedures.unbalance import procedure as unbalance
 from procedures.unbalance import sequence
 
 if TYPE_CHECKING:
     from procedures.compensation import checks
+    from procedures.synchronous.estimates import Results
 
 REDUCTION = Quantity(
     "reduction",
@@ -106,6 +105,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Compared:
     """The dwells as in `unbalance`, the reductions, and the switch where it was captured."""
     from procedures.compensation import checks
     from procedures.compensation.hum import of_switch
+    from procedures.synchronous.hum import listen
 
     results = unbalance.evaluate(recording, findings)
     reductions = checks.reductions(results)

@@ -31,8 +31,6 @@ from procedures.run_up.steps import MISSED, PASSAGE, read_passage
 from procedures.shared import assumptions, first_look
 from procedures.shared.rates import rate_of
 from procedures.synchronous import bearings, dwelling
-from procedures.synchronous import checks as dwell_checks
-from procedures.synchronous.coil_peaks import find_uncertified
 from procedures.synchronous.default_speeds import within_envelope
 from procedures.synchronous.dwells import SLOW, can_capture, captured_channels, read_dwell
 from procedures.unbalance import procedure as unbalance
@@ -177,6 +175,8 @@ def _fetch(rig: Rig, plan: Passing, record: Recorder, speed: float) -> None:
 def evaluate(recording: Recording[Any], findings: Findings) -> Run:
     """The passage's curves with their criticals, and the vectors at the captures' speeds."""
     from procedures.run_up import checks, estimates
+    from procedures.synchronous import checks as dwell_checks
+    from procedures.synchronous.coil_peaks import find_uncertified
 
     first_look.gate(recording, findings, wiring.before_orbits(recording))
     findings.gate([*wiring.before_orbits(recording), *checks.before(recording)])

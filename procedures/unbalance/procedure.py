@@ -7,7 +7,7 @@ D_max and its share of the clearance (ISO 14839-2), currents and voltages of the
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from bench.figures import Shown
 from bench.findings import Findings
@@ -21,15 +21,15 @@ from procedures.amb_rotor import lift, pushes, wiring
 from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.laws import of_laws, of_variants
 from procedures.shared import assumptions, first_look
-from procedures.synchronous import bearings, checks, dwelling, estimates, fitting, identified
-from procedures.synchronous.coil_peaks import find_uncertified
+from procedures.synchronous import bearings, dwelling, fitting
 from procedures.synchronous.default_speeds import within_envelope
 from procedures.synchronous.dwells import can_capture, read_dwells
-from procedures.synchronous.estimates import Results
-from procedures.synchronous.hum import listen, of_dwells
 from procedures.unbalance import sequence
 from procedures.unbalance.plan import Plan
 from procedures.unbalance.requires import requires
+
+if TYPE_CHECKING:
+    from procedures.synchronous.estimates import Results
 
 COSINE = Quantity(
     "vector_cos",
@@ -87,6 +87,10 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
 
 def evaluate(recording: Recording[Any], findings: Findings) -> Results:
     """Vectors, orbits, D_max and what the coils need, of each dwell."""
+    from procedures.synchronous import checks, estimates, identified
+    from procedures.synchronous.coil_peaks import find_uncertified
+    from procedures.synchronous.hum import listen, of_dwells
+
     first_look.gate(recording, findings, wiring.before_orbits(recording))
     findings.gate([*wiring.before_orbits(recording), *checks.before(recording)])
     dwells, plan = read_dwells(recording), recording.plan
