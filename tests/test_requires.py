@@ -30,6 +30,7 @@ OF = {
     "rlsrm": ("map-zero", "inductance-map", "static-characteristics", "load-response", "positioning", "step-following",
               "sine-following", "axis-friction", "axis-breakaway", "axis-inertia", "decoupling"),
 }  # fmt: skip
+PROCEDURES = Path(__file__).resolve().parents[1] / "procedures"
 PAIRS = [(rig, name) for rig, names in OF.items() for name in names]
 TABLES = ("channels", "sensors", "parameters", "geometry", "machine")
 
@@ -183,6 +184,13 @@ def test_what_a_procedure_needs_is_imported_without_the_procedure() -> None:
 @pytest.mark.parametrize("entry", catalogue.PROCEDURES, ids=lambda entry: entry.name)
 def test_a_procedure_asks_for_what_its_room_says(entry: catalogue.Entry) -> None:
     assert load_procedure(entry.name).requires is requires_of(entry)
+
+
+def test_a_live_run_imports_nothing_while_the_machine_moves() -> None:
+    """Neither what `acquire` looks at between two runs, nor what evaluates afterwards."""
+    code = "from bench.cli.compose import load_all_of as load, load_procedure as named\nload(named('balance'))"
+    room = {f"procedures.balance.{path.stem}" for path in (PROCEDURES / "balance").glob("[!_]*.py")}
+    assert {"procedures.balance.estimates", "procedures.balance.figures"} < room <= imported(code)
 
 
 def test_a_room_of_one_file_says_by_its_procedure_what_it_needs(

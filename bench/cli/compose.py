@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import difflib
 import importlib
+import pkgutil
 import shlex
 import sys
 from collections.abc import Mapping, Sequence
@@ -139,7 +140,7 @@ def _job(request: Request, job: Job, asking: Asking) -> tuple[Job, Connect]:
     if job.procedure.continues:
         job = replace(job, asked=continuing.asked(request, rig))
     if job.seed is None:
-        _load_numerics()
+        load_all_of(job.procedure)
         kind = request.operator or ("console" if sys.stdin.isatty() else "auto")
         job = replace(job, lock=rig_lock(rig.link.url.partition("?")[0]))
         return job, live(rig, kind, injected, request.clear_fault, asking)
@@ -155,11 +156,15 @@ def _job(request: Request, job: Job, asking: Asking) -> tuple[Job, Connect]:
     return replace(job, visit=visit), connect
 
 
-def _load_numerics() -> None:
-    """Procedures import scipy where they compute. In a live run that would take up to a second while the machine moves, as
-    long as the heartbeat's lease."""
+def load_all_of(procedure: Procedure) -> None:
+    """Procedures import what evaluates where they evaluate, and scipy where they compute. In a live run that would take up to a
+    second while the machine moves, as long as the heartbeat's lease."""
     for name in NUMERICS:
         importlib.import_module(f"scipy.{name}")
+    room = procedure.plan.__module__.rpartition(".")[0]
+    if procedure.origin is None and room:  # ours: what somebody else's package has beside its procedure is not known
+        for module in pkgutil.iter_modules(importlib.import_module(room).__path__, f"{room}."):
+            importlib.import_module(module.name)
 
 
 def assignments_of(need: Need) -> list[str]:
