@@ -162,7 +162,7 @@ def load_all_of(procedure: Procedure) -> None:
     for name in NUMERICS:
         importlib.import_module(f"scipy.{name}")
     room = procedure.plan.__module__.rpartition(".")[0]
-    if procedure.origin is None and room:  # ours: what somebody else's package has beside its procedure is not known
+    if room.startswith("procedures."):  # what somebody else's package has beside its procedure is not known
         for module in pkgutil.iter_modules(importlib.import_module(room).__path__, f"{room}."):
             importlib.import_module(module.name)
 
