@@ -10,9 +10,10 @@ from bench.findings import Effect, Finding
 from bench.rigfile import RigFile
 from procedures.gate_margin.estimates import CATCH, GATE, Results
 from procedures.gate_margin.fit import Array, cut
-from procedures.gate_margin.place import grid, motion, radial, samples
+from procedures.gate_margin.place import grid, samples
 from procedures.gate_margin.plan import Plan
 from procedures.gate_margin.steps import Taken, Trial
+from procedures.position_loops.movers import motion, radial
 from procedures.position_loops.recorded import LEVITATED
 from procedures.shared import signals
 

@@ -12,9 +12,10 @@ from bench.rigfile import RigFile
 from bench.rigfile.places import Places
 from bench.uncertainty import Estimate, Influence
 from procedures.gate_margin import fit
-from procedures.gate_margin.place import Plane, planes, radial, samples
+from procedures.gate_margin.place import Plane, planes, samples
 from procedures.gate_margin.plan import Plan
 from procedures.gate_margin.steps import Array, Taken
+from procedures.position_loops.movers import radial
 from procedures.shared.certificates import certified
 
 NEAR = 0.2  # of an excursion: a plane is taken to have half of the mass

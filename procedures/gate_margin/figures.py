@@ -10,7 +10,8 @@ import numpy as np
 from bench.figures import Figure, Series
 from bench.rigfile import RigFile
 from procedures.gate_margin.estimates import Looked, Results
-from procedures.gate_margin.place import radial, samples
+from procedures.gate_margin.place import samples
+from procedures.position_loops.movers import radial
 
 UM = 1e6
 

@@ -7,12 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from bench.errors import Lacking
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.rigfile.bit import Bit
-from bench.rigfile.capabilities_of_loops import Motion
 from procedures.gate_margin.plan import Plan
+from procedures.position_loops.movers import motion, radial
 from procedures.shared.rates import rate_of
 
 USUAL_HZ = 35e3
@@ -47,29 +46,12 @@ class Plane:
     axis: str
 
 
-def motion(rig: RigFile) -> Motion:
-    """How the mover is sent, and its gate.
-
-    Raises:
-        Lacking: the rig file does not say.
-    """
-    found = rig.capabilities.motion
-    if found is None:
-        raise Lacking("capabilities: found no motion")
-    return found
-
-
 def grid(plan: Plan) -> tuple[Place, ...]:
     """Every place with every angle; the angles to and fro, so that no way is long."""
     out = []
     for k, place in enumerate(plan.places_m):
         out += [Place(place, angle) for angle in plan.angles_rad[:: -1 if k % 2 else 1]]
     return tuple(out)
-
-
-def radial(rig: RigFile) -> dict[str, str]:
-    """Channels of the probes that look across the shaft, by the probes' names."""
-    return {name: probe.channel for name, probe in rig.probes.items() if probe.direction is not None}
 
 
 def planes(rig: RigFile) -> tuple[Plane, ...]:

@@ -20,22 +20,11 @@ from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
 from procedures.gate_margin import estimates
 from procedures.gate_margin.estimates import Results, weight_of
-from procedures.gate_margin.place import (
-    GATE,
-    TIME,
-    TRIAL,
-    WINDOWS,
-    Place,
-    bound_of,
-    captured,
-    grid,
-    motion,
-    planes,
-    rate,
-)
+from procedures.gate_margin.place import GATE, TIME, TRIAL, WINDOWS, Place, bound_of, captured, grid, planes, rate
 from procedures.gate_margin.plan import Plan
 from procedures.gate_margin.requires import requires
 from procedures.gate_margin.steps import read_taken, read_trials
+from procedures.position_loops.movers import motion
 from procedures.shared import assumptions, planned
 
 MARGIN = Quantity("gate_margin", "m", "gate less the largest radial reading in one of its times, noise included, "

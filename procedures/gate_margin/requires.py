@@ -5,7 +5,8 @@ from __future__ import annotations
 from bench.procedure.requires import Requires
 from bench.rigfile import RigFile
 from bench.rigfile.roles import STATE
-from procedures.gate_margin.place import captured, motion, radial
+from procedures.gate_margin.place import captured
+from procedures.position_loops.movers import motion, radial
 
 
 def requires(rig: RigFile) -> Requires:

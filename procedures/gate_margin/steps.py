@@ -10,7 +10,8 @@ import numpy.typing as npt
 
 from bench.recording import Recording, Step
 from bench.rigfile.roles import STATE
-from procedures.gate_margin.place import TRIAL, WINDOWS, Place, captured, limits, radial
+from procedures.gate_margin.place import TRIAL, WINDOWS, Place, captured, limits
+from procedures.position_loops.movers import radial
 
 Array = npt.NDArray[np.float64]
 

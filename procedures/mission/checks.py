@@ -10,8 +10,8 @@ from bench.findings import Effect, Finding
 from bench.rigfile import RigFile
 from procedures.mission.estimates import Told, gate_of, gated
 from procedures.mission.plan import Plan
-from procedures.mission.requires import radial
 from procedures.mission.steps import Flight, holds
+from procedures.position_loops.movers import radial
 
 UM = 1e6
 EXPECTED = ("LIFTING", "LEVITATED")

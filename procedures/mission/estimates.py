@@ -18,8 +18,8 @@ from bench.uncertainty import Estimate, Influence
 from procedures.mission import fit
 from procedures.mission.fit import Largest
 from procedures.mission.plan import Plan
-from procedures.mission.requires import motion, radial
 from procedures.mission.steps import Flight, Move, Piece, holds
+from procedures.position_loops.movers import motion, radial
 from procedures.shared.certificates import certified_gain
 
 Array = npt.NDArray[np.float64]

@@ -13,8 +13,8 @@ from bench.rigfile import RigFile
 from procedures.mission.estimates import Told, gate_of
 from procedures.mission.fit import smoothed
 from procedures.mission.plan import Plan
-from procedures.mission.requires import motion, radial
 from procedures.mission.steps import Flight, Piece
+from procedures.position_loops.movers import motion, radial
 
 Array = npt.NDArray[np.float64]
 UM = 1e6

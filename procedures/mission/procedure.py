@@ -23,8 +23,9 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from procedures.mission.plan import Plan
-from procedures.mission.requires import motion, radial, requires
+from procedures.mission.requires import requires
 from procedures.mission.steps import LIFT, MOVE, TURN, Flight, captured, read
+from procedures.position_loops.movers import motion, radial
 from procedures.shared import assumptions, planned
 
 if TYPE_CHECKING:

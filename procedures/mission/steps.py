@@ -12,7 +12,7 @@ from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.rigfile.roles import STATE
 from procedures.mission.plan import Plan
-from procedures.mission.requires import motion, radial
+from procedures.position_loops.movers import motion, radial
 
 Array = npt.NDArray[np.float64]
 TURN, LIFT, MOVE = "turn", "lift", "move"

@@ -14,7 +14,8 @@ WINDOWS = 4
 
 def margins(done: Simulated) -> Found:
     """At the places of the plan, of the same machine levitated anew."""
-    from procedures.gate_margin.place import bound_of, grid, motion, planes
+    from procedures.gate_margin.place import bound_of, grid, planes
+    from procedures.position_loops.movers import motion
     from sim_backend.mission_motion import GateAsked
 
     rig, plan, of = done.recording.rig, done.recording.plan, done.drawn.machine.motions.gates

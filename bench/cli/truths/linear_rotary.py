@@ -33,8 +33,8 @@ def currents(done: Simulated) -> Found:
 def mission(done: Simulated) -> Found:
     from procedures.mission.estimates import gate_of, place_of, rest_of
     from procedures.mission.procedure import TURN_RATE, TURN_RISE
-    from procedures.mission.requires import motion
     from procedures.mission.steps import LIFT
+    from procedures.position_loops.movers import motion
     from sim_backend.mission_motion import MissionAsked
 
     plan: Any = done.recording.plan
