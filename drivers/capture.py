@@ -98,10 +98,10 @@ class ControllerCapture:
             )
         if status != "OK":
             asked = f"channels {', '.join(layout.channels)}; trigger {waits_for(trigger)}; {length} samples"
-            raise BenchError(
-                f"capture: the controller refuses it: {status}; asked for were {asked}; its memory is "
-                f"{reply['memory']:.0f} bytes"
-            )
+            told = (
+                f"; its memory is {reply['memory']:.0f} bytes" if reply["memory"] else ""
+            )  # a command line tells none
+            raise BenchError(f"capture: the controller refuses it: {status}; asked for were {asked}{told}")
         self._armed = layout, trigger, int(reply["number"])
 
     def wait(self, timeout_s: float) -> None:

@@ -16,6 +16,7 @@ from bench.rigfile.binding import (
 from bench.rigfile.bit import Bit
 from bench.rigfile.capabilities import Capabilities
 from bench.rigfile.messages import Message, MessageMap
+from bench.rigfile.model import Sensor
 from sim_backend.machine import Machine
 
 TELEMETRY = "Telemetry"
@@ -31,18 +32,22 @@ def channels_by_reading(rig: RigFile) -> Mapping[str, str]:
     return by_signal | {reading: name for name, reading in stated_readings(rig).items()}
 
 
+def sensors_by_reading(rig: RigFile) -> Mapping[str, Sensor]:
+    """The certified sensors by the readings that their channels are."""
+    reading = {channel: name for name, channel in channels_by_reading(rig).items()}
+    return {reading.get(channel, channel): sensor for channel, sensor in rig.sensors.items()}
+
+
 def stated_readings(rig: RigFile) -> Mapping[str, str]:
     """The machine's reading of a channel, where `[simulation.readings]` says it."""
     stated = rig.simulation.get("readings", {})
     return {str(k): str(v) for k, v in stated.items()} if isinstance(stated, dict) else {}
 
 
-def reading_of(rig: RigFile, channel: str, own: bool = True) -> str:
-    """The machine's own name of a channel; `own`: the DBC has the machine's names."""
-    if not own:
-        return stated_readings(rig).get(channel, channel)
+def reading_of(rig: RigFile, channel: str) -> str:
+    """The machine's own name of a channel, of a rig whose DBC has the machine's names."""
     bound = rig.channels.get(channel)
-    return channel if bound is None else bound.signal.partition(".")[2]
+    return stated_readings(rig).get(channel, channel) if bound is None else bound.signal.partition(".")[2]
 
 
 def own_words(messages: MessageMap, machine: Machine, binding: Binding) -> bool:
@@ -111,6 +116,6 @@ def told_as(rig: RigFile, channel: str, known: frozenset[str]) -> str | None:
     stated = stated_readings(rig)
     if channel in stated:
         return stated[channel] if stated[channel] in known else None
-    signal = rig.channels[channel].signal.partition(".")[2]
+    signal = rig.channels[channel].signal.partition(".")[2] if channel in rig.channels else channel
     found = next((name for name in (channel, signal) if name in known), None)
     return "supply" if found is None and channel == rig.envelope.supply else found

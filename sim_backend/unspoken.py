@@ -47,7 +47,7 @@ def _of_time(rig: RigFile, messages: MessageMap, machine: Machine) -> Iterator[P
 
 def _of_controls(rig: RigFile, machine: Machine) -> Iterator[Problem]:
     for key, name in without_control(rig, machine):
-        expected = "bearings and axes by the names that it has in the shipped rig file, or a twin (`machine` left out)"
+        expected = "bearings, axes and settings by the names of the shipped rig file, or a twin (`machine` left out)"
         yield Problem(
             rig.path, f"capabilities.{key}", f"{name}, which the simulated {machine.name} would not hear", expected
         )

@@ -91,7 +91,7 @@ class Speaker:
             return lines.cancel if self._rig.messages.code(name, "code", "CANCEL") == v["code"] else lines.state
         kind = self._rig.messages[name].signal("trigger").choices.get(int(v["trigger"]), "")
         assert self._rig.capture is not None
-        named = {c.index: n for n, c in self._rig.capture.channels.items()}
+        named = {c.index: lines.called.get(n, n) for n, c in self._rig.capture.channels.items()}
         watched = {"channel": named.get(int(v["source"]), ""), "level": f"{v['level']:.9g}"}
         return filled(lines.arm, {
             "channels": f"{int(v['channels0']) | int(v['channels1']) << 32:x}",

@@ -94,6 +94,9 @@ def _captures(rig: RigFile, lines: CommandLine, messages: MessageMap) -> Iterato
     for name in captures.states:
         if name not in states:
             yield f"{KEY}.capture.states.{name}", "no such state of CaptureStatus", f"one of {', '.join(states)}"
+    for name in captures.called:
+        if name not in rig.capture.channels:
+            yield f"{KEY}.capture.called.{name}", "no such channel", "a key of [capture.channels]"
     for name in captures.told:
         if name not in COUNTED:
             yield f"{KEY}.capture.told.{name}", "nothing that a capture tells", f"one of {', '.join(COUNTED)}"

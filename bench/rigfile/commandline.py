@@ -44,6 +44,8 @@ class CaptureLines(Part):
     triggers: Mapping[str, str] = Field(min_length=1)
     states: Mapping[str, str] = Field(min_length=1)
     told: Mapping[str, str] = {}
+    called: Mapping[str, str] = {}
+    """What the firmware calls a channel, where it is not the rig file's name for it."""
     none: tuple[int, ...] = ()
     """Errors that say that there is no capture."""
 

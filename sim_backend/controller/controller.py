@@ -23,7 +23,7 @@ from sim_backend.controller.states import States
 from sim_backend.controller.telemetry import Span, TelemetryEncoder
 from sim_backend.core import Array
 from sim_backend.machine import TracedPlant, Truth
-from sim_backend.spoken import own_words, reading_of
+from sim_backend.spoken import own_words, reading_of, told_as
 
 __all__ = ["MAP_VERSION", "SimulatedController"]
 REST_S = 0.5  # it has been on for so long when the host connects: the rotor lies still on its rings
@@ -125,8 +125,9 @@ class SimulatedController:
         traced = self._machine.traced(self.truth.defects)
         self.captures = None
         if self._rig.capture is not None and traced:
-            names = [reading_of(self._rig, c, self._own_words) for c in self._rig.capture.channels]
-            called = dict(zip(names, self._rig.capture.channels, strict=True))
+            known, called = frozenset(traced), dict[str, str]()
+            for c in self._rig.capture.channels:
+                called[reading_of(self._rig, c) if self._own_words else told_as(self._rig, c, known) or c] = c
             self.captures = CapturePort(self._rig, self._map, [called.get(n, n) for n in traced], self.plant.tick_s)
         self._requests = Requests(
             self._rig, self._map, lambda: self.plant.tick, self._owner, self.parameters, self.states, self.captures

@@ -6,10 +6,14 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from bench.rigfile import RigFile
-from bench.rigfile.capabilities import Capabilities, parameters_named
+from bench import catalogue
+from bench.rigfile import RigFile, load_rig
+from bench.rigfile.capabilities import Capabilities
 from bench.rigfile.former_parameters import capabilities_by_name
 from sim_backend.machine import Machine
+from sim_backend.spoken import channels_by_reading
+
+Place = tuple[str, ...]
 
 OWN: Final = {"watchdog_s": 0.08, "landing_speed": 5.0, "speed_ref": 0.0, "lift_time_s": 1.0}
 """Controls of the controller itself, SI, with what they are where no parameter of the rig sets them and `[simulation]` says
@@ -62,28 +66,50 @@ def meanings(rig: RigFile, machine: Machine) -> Capabilities:
 
 def _by_meaning(rig: RigFile, machine: Machine) -> Iterator[tuple[str, Control]]:
     """Where a rig file binds a capability to a parameter of another name than the machine's own has for it."""
-    meant = _by_place(meanings(rig, machine))
-    for place, name in _by_place(rig.capabilities).items():
-        if place in meant and name not in machine.controls:
-            yield name, Control(meant[place])
+    known = frozenset((*machine.controls, *OWN))
+    if others := {place: name for place, name in _bound(rig).items() if name not in known}:
+        meant = _meant(rig, machine)
+        yield from ((name, Control(meant[place])) for place, name in others.items() if place in meant)
 
 
 def without_control(rig: RigFile, machine: Machine) -> Iterator[tuple[str, str]]:
     """Capabilities that a machine with a law of its own does not have, by their keys, and the parameters that are bound to
     them: of bearings and axes that it knows by other names."""
-    meant = _by_place(meanings(rig, machine))
-    for place, name in _by_place(rig.capabilities).items():
-        if place not in meant and name not in (*machine.controls, *OWN):
-            yield place[0], name
+    known = frozenset((*machine.controls, *OWN, *rig.channels))  # a channel may be called like a parameter
+    if others := {place: name for place, name in _bound(rig).items() if name not in known}:
+        meant = _meant(rig, machine)
+        heard = {name for place, name in others.items() if place in meant}
+        yield from ((".".join(place), name) for place, name in others.items() if name not in heard)
 
 
-def _by_place(c: Capabilities) -> dict[tuple[str, int], str]:
-    """Parameters by their key, those of a setting by their number in it: there the key has their own names."""
-    out: dict[tuple[str, int], str] = {}
-    for key, name in parameters_named(c):
-        place = key.removesuffix(f".{name}") if key.startswith("settings.") else key
-        out[place, sum(one == place for one, _ in out)] = name
-    return out
+def _meant(rig: RigFile, machine: Machine) -> dict[Place, str]:
+    """The machine's own parameter of each place in `[capabilities]`: what the protocol's names mean, and what the shipped rig
+    file of the machine's name, where there is one, binds."""
+    known = frozenset((*machine.controls, *OWN))
+    found = {place: name for place, name in _names(meanings(rig, machine).model_dump(), {}) if name in known}
+    shipped = machine.name in {entry.name for entry in catalogue.rigs()}
+    return found | _bound(load_rig(machine.name)) if shipped else found
+
+
+def _bound(rig: RigFile) -> dict[Place, str]:
+    """Parameters by their place in `[capabilities]`. Where one is a key, as in a setting, its number is its place: there the
+    names are the file's own; where a channel is one, its reading is."""
+    reading = {channel: name for name, channel in channels_by_reading(rig).items()}
+    return {place: name for place, name in _names(rig.capabilities.model_dump(), reading) if name in rig.parameters}
+
+
+def _names(table: object, reading: Mapping[str, str], place: Place = ()) -> Iterator[tuple[Place, str]]:
+    if isinstance(table, str):
+        yield place, table
+    elif isinstance(table, Mapping):
+        for number, (key, value) in enumerate(table.items()):
+            if isinstance(value, int | float):
+                yield (*place, str(number)), str(key)
+            else:
+                yield from _names(value, reading, (*place, reading.get(str(key), str(key))))
+    elif isinstance(table, list | tuple):
+        for number, value in enumerate(table):
+            yield from _names(value, reading, (*place, str(number)))
 
 
 def _own(rig: RigFile) -> Iterator[tuple[str, Control]]:

@@ -26,6 +26,7 @@ from sim_backend.machines.lira.truth_mission import mission
 from sim_backend.machines.lira.truth_pull import pulls
 from sim_backend.machines.lira.truth_runout import runout
 from sim_backend.motion import Motions
+from sim_backend.spoken import sensors_by_reading
 
 HALVES: Final = range(1, COILS + 1)
 """Coils and half-bridges by their numbers: coil k is driven by half-bridge k."""
@@ -78,7 +79,7 @@ def stated(rig: RigFile) -> dict[str, Toleranced]:
         "mass_density": rig.mass_density,
     }
     out |= {f"masses.{k}": t for k, t in rig.masses.items()}
-    for name, sensor in rig.sensors.items():
+    for name, sensor in sensors_by_reading(rig).items():
         out |= {f"{name}.gain": sensor.gain, f"{name}.offset": sensor.offset}
     for name, t in rig.simulation.items():
         if isinstance(t, Toleranced):

@@ -23,6 +23,7 @@ from sim_backend.machines.rlsrm.truth_load import loads
 from sim_backend.machines.rlsrm.truth_map import of_map, of_zeros
 from sim_backend.machines.rlsrm.truth_static import statics
 from sim_backend.motion import Motions
+from sim_backend.spoken import sensors_by_reading
 
 EACH: Final = {"phase_gain": NAMES, "resistance_spread": NAMES, "stator_zero": ("1", "2")}
 """Numbers that the rig file states once and each phase or stator has of its own: what their draws' names end in."""
@@ -41,7 +42,7 @@ def stated(rig: RigFile) -> dict[str, Toleranced]:
     out = {f"geometry.{k}": t for k, t in rig.geometry.items()} | {f"machine.{k}": t for k, t in rig.machine.items()}
     out |= {f"masses.{k}": t for k, t in rig.masses.items()} | {"hanger": rig.hanger, "mass_density": rig.mass_density}
     out |= {"site.gravity": rig.site.gravity, "site.air_density": rig.site.air_density}
-    for name, sensor in rig.sensors.items():
+    for name, sensor in sensors_by_reading(rig).items():
         out |= {f"{name}.gain": sensor.gain, f"{name}.offset": sensor.offset}
     out |= dict(_inline(rig)) | instrument.stated(rig) | load_cells.stated(rig)
     for name, t in rig.simulation.items():
