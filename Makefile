@@ -42,7 +42,7 @@ faults: setup
 # What `make ci-long` leaves out of what runs in real time, one by one: the chain's first step on every link, the maximum speed,
 # served readings like those that it takes over their limit.
 links: setup
-	$(BIN)/python -m pytest -q -m links tests/links
+	$(BIN)/python -m pytest -q -m links tests/links tests/firmware
 
 # More cases of what `make ci-long` shows by a few, and the pages of procedures whose whole path and figures are in tests/procedures.
 longer: setup

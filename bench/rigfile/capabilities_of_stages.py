@@ -54,12 +54,14 @@ class PositionedAxis(Part):
 
 class Positioning(Part):
     """Axes by the names of encoders. `homed`: the bit that says that their zeros are known; without one they are looked for
-    each time that the machine is to be held. `home_time`: the longest that takes, s. `make_safe`: whether a machine that was
-    made safe is without currents or held where it came to rest."""
+    each time that the machine is to be held. `home_time`: the longest that takes, s. `loop_s`: period of the loops, at whose
+    ticks set points start. `make_safe`: whether a machine that was made safe is without currents or held where it came to rest.
+    """
 
     axes: Mapping[Name, PositionedAxis] = Field(min_length=1)
     homed: Bit | None = None
     home_time: float = Field(60.0, gt=0)
+    loop_s: float = Field(0.0, ge=0)
     make_safe: Literal["let go", "hold"] = "let go"
 
 

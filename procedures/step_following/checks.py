@@ -22,8 +22,10 @@ ELSEWHERE = 1e-3  # of a step, by which a set point may miss where it was sent
 
 
 def told(axis: StageAxis, value: float) -> str:
-    """A length or an angle for a reader."""
-    return f"{math.degrees(value):z.3f}°" if axis.unit == "rad" else f"{value * 1e3:z.4f} mm"
+    """A length or an angle for a reader; what is under a micrometre by three digits."""
+    if axis.unit == "rad":
+        return f"{math.degrees(value):z.3f}°"
+    return f"{value * 1e3:z.4f} mm" if abs(value) >= 1e-6 or not value else f"{value * 1e6:.3g} µm"
 
 
 def of_moves(moves: Sequence[Move], rig: RigFile, plan: Plan) -> Iterator[Finding]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -28,6 +30,7 @@ from procedures.step_following.fit import Stepped, began, stepped
 from procedures.step_following.plan import Plan
 from procedures.step_following.steps import UP, Move, places, step_of
 
+ALIKE = 1e-3  # of a sample's period, by which loops and telemetry have the same
 EVEN = 0.25  # of half a count: an eighth of a whole one
 ERROR, TRUE, OVER, TIME = "static_error", "true_static_error", "overshoot", "settling_time"
 
@@ -76,15 +79,15 @@ def one(move: Move, plan: Plan) -> Stepped:
     return stepped(track.t, track.read, target, step, begun, rest, plan.band, pitch_of(axis))
 
 
-def results(groups: Sequence[Group], plan: Plan) -> Results:
-    """All estimates."""
+def results(groups: Sequence[Group], plan: Plan, loop_s: float) -> Results:
+    """All estimates; `loop_s`: period of the loops at whose ticks set points start, s, 0 where that is not known."""
     out: dict[tuple[str, str], Estimate] = {}
     for g in groups:
-        out |= _of_group(g, plan)
+        out |= _of_group(g, plan, loop_s)
     return Results(groups, out)
 
 
-def _of_group(g: Group, plan: Plan) -> Mapping[tuple[str, str], Estimate]:
+def _of_group(g: Group, plan: Plan, loop_s: float) -> Mapping[tuple[str, str], Estimate]:
     axis, where, way = g.axis, g.where, (1.0 if g.way == UP else -1.0)
     size = abs(step_of(axis, plan, g.way))
     target = places(axis, plan)[g.way == UP]
@@ -98,8 +101,22 @@ def _of_group(g: Group, plan: Plan) -> Mapping[tuple[str, str], Estimate]:
         (OVER, where): Estimate(over.value / size, "1", {i: c / size for i, c in over.sensitivities.items()}),
     }
     if all(f.settled is not None for f in g.found):
-        out[TIME, where] = _time(g)
+        out[TIME, where] = _time(g) + _start(g, loop_s)
     return out
+
+
+def _start(g: Group, loop_s: float) -> Estimate:
+    """What a settling time is shorter by, s: the set point starts at a tick of the loops after the last sample at which it is
+    where it was, at one before the next sample; each step for itself, at any of them alike likely."""
+    period = float(np.median(np.diff(g.moves[0].track.t)))
+    half = max(period - loop_s, 0.0) / 2
+    if half < ALIKE * period:
+        return Estimate(0.0, "s", {})
+    u = half / RECTANGLE / math.sqrt(len(g.moves))
+    form: Literal["rectangular", "normal"] = "rectangular" if len(g.moves) == 1 else "normal"
+    return Estimate.of(
+        -half, Influence(f"start/{g.where}", "set point's start, between two samples", u, "s", "B", form)
+    )
 
 
 def _time(g: Group) -> Estimate:

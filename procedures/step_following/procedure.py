@@ -69,7 +69,8 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     findings.gate(checks.of_moves(moves, rig, plan))
     groups = estimates.grouped(moves, plan)
     findings.add(checks.of_groups(groups, moves, rig, plan))
-    return estimates.results(groups, plan)
+    positioning = rig.capabilities.positioning
+    return estimates.results(groups, plan, positioning.loop_s if positioning is not None else 0.0)
 
 
 def measured(found: Results) -> Iterator[Measured]:

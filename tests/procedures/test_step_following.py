@@ -174,7 +174,7 @@ def test_static_error_and_its_budget_by_hand() -> None:
     """12 um beyond, with readings that rose last: half a count by the encoder; against the true place a sixth of a count nearer
     to where it came from, within 4/45 of a square count, and the encoder's edges and pitch besides."""
     some, plan = moves(offset=12e-6)
-    found = results(grouped(some, plan), plan).estimates
+    found = results(grouped(some, plan), plan, 1e-3).estimates
     own, true = found["static_error", "x, up"], found["true_static_error", "x, up"]
     assert own.value == pytest.approx(12e-6, abs=1e-12)
     assert true.value == pytest.approx(12e-6 - COUNT / 6, abs=1e-12)
@@ -188,7 +188,7 @@ def test_of_rests_in_several_counts_more_is_known_than_of_one() -> None:
     some, plan = moves(offset=12e-6)
     apart = [replace(m, track=replace(m.track, read=np.where(m.track.t < 0.06, m.track.read, m.track.read + k * COUNT)))
              for k in range(5) for m in some[:1]]  # fmt: skip
-    own = results(grouped(apart, plan), plan).estimates["static_error", "x, up"]
+    own = results(grouped(apart, plan), plan, 1e-3).estimates["static_error", "x, up"]
     assert own.value == pytest.approx(14e-6 - COUNT / 6, abs=1e-12)
     assert own.u == pytest.approx(math.sqrt(4 / 45 / 5) * COUNT, rel=1e-6)
 
@@ -296,3 +296,30 @@ def test_plans_that_cannot_work() -> None:
     encoders = {n: e.model_copy(update={"pitch": None, "counts": None}) for n, e in RLSRM.encoders.items()}
     (said,) = requires(RLSRM.model_copy(update={"encoders": encoders})).lacking(RLSRM)
     assert said.startswith("encoders: found no pitch of x, angle")
+
+
+def test_loops_between_two_samples_start_at_any_time() -> None:
+    """Told every 2 ms of loops at 0.5 ms: a step starts up to 1.5 ms after the last sample at which the set point is where it
+    was. Of 400 groups of three, each at a tick of its own, the intervals hold the true time; where their period is left out,
+    it is taken to start at any time, a quarter of a millisecond late; by loops of the telemetry's own period all are long."""
+    rng, tick, plan, axis = np.random.default_rng(5), 5e-4, Plan(moved="stroke", lead=0, repeats=3), axes_of(RLSRM)["x"]
+    low, high = plan.places_m
+    t = np.arange(1000) * 2e-3
+    errors: dict[float, list[float]] = {tick: [], 0.0: [], 2e-3: []}
+    for _ in range(400):
+        some, lasts = [], rng.uniform(0.1, 0.104)
+        for repeat in range(3):
+            begins = 0.05 + tick * rng.integers(4)  # right after the sample at 0.05 s, or one of three ticks after that
+            reference = low + (high - low) * np.clip((t - begins) / lasts, 0.0, 1.0)
+            track = Track(axis, t, np.round(reference / COUNT) * COUNT, reference, 0 * t, 0 * t, ("HOLDING",), 0, 1000)
+            some.append(Move(Mode("x", (axis,)), UP, repeat, track))
+        for loop_s, found in errors.items():
+            told = results(grouped(some, plan), plan, loop_s).estimates["settling_time", "x, up"]
+            found.append((told.value - 0.98 * lasts) / interval(told).U)
+    own, free, sampled = (np.array(found) for found in errors.values())
+    assert abs(own.mean()) < 0.1
+    assert 0.914 < np.mean(np.abs(own) < 1) < 0.986
+    assert 0.8 < 1 / np.percentile(np.abs(own), 95) < 1.25
+    assert -0.3 < free.mean() < -0.1
+    assert np.mean(np.abs(free) < 1) > 0.914
+    assert np.mean(np.abs(sampled) < 1) < 0.8

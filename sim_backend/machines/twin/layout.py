@@ -139,11 +139,13 @@ def _lacking(rig: RigFile) -> Iterator[Problem]:
     def problem(key: str, found: str, expected: str) -> Problem:
         return Problem(rig.path, key, found, expected)
 
+    if not any(b.kind == "radial" for b in rig.bearings.values()):
+        yield problem(
+            "bearings", "no radial one", "one that holds the shaft; a twin's rotor floats, and a stage has none"
+        )
+        return
     if rig.shaft is None or (rig.shaft.mass is None and "mass" not in rig.simulation):
         yield problem("shaft.mass", "nothing", "the mass of what floats, here or as simulation.mass")
-        return
-    if not any(b.kind == "radial" for b in rig.bearings.values()):
-        yield problem("bearings", "no radial one", "one that holds the shaft; a twin's rotor floats")
         return
     counts = {"radial axes": len(list(_axes(rig, "radial"))), "axial axes": len(list(_axes(rig, "axial"))),
               "probes": len(rig.probes), "rings": len(list(_rings(rig))), "balancing planes": len(rig.balancing)}  # fmt: skip
