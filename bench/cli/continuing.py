@@ -90,7 +90,7 @@ def _continuable(recording: Recording[Any], run: RunDirectory) -> Procedure:
     raise ConfigError(
         f"{run.path}: {found.name} cannot be continued: what the machine does between its steps matters, or they take no "
         f"operator's work; expected one of {able}. Nothing was started. Next: "
-        f"`bench run {found.name} --rig {recording.rig.name}` anew"
+        f"{stopped.anew(recording)} anew"
     )
 
 

@@ -80,12 +80,17 @@ def left_of(run: RunDirectory, recording: Recording[Any], procedure: Procedure) 
             kind = procedure.continues
             found = f"no step {kind!r} that was" if whole == 1 else f"no {whole} steps {kind!r} in a row that were"
             raise ConfigError(
-                f"{run.path}: found {found} completed: there is nothing to continue{NOTHING} "
-                f"Next: `bench run {procedure.name} --rig {recording.rig.name}`"
+                f"{run.path}: found {found} completed: there is nothing to continue{NOTHING} Next: {anew(recording)}"
             )
         return replace(earlier, told=_told(run, earlier, ending))
     except RecordingError as error:
         raise ConfigError(f"{run.path}: cannot be continued{NOTHING} {error}") from error
+
+
+def anew(recording: Recording[Any]) -> str:
+    """The command that makes such a run anew, on the same kind of rig."""
+    live = " --backend live" if recording.run.get("backend") == "live" else ""
+    return f"`bench run {recording.procedure} --rig {recording.rig.name}{live}`"
 
 
 def _told(run: RunDirectory, earlier: Earlier, ending: Ending) -> dict[str, Any]:

@@ -12,7 +12,10 @@ from stopped_runs import CALIBRATION, ran, stopped_after
 
 from bench import lock
 from bench.cli.compose import Request
+from bench.recording import Recording
+from bench.run import stopped
 from bench.run.runner import RunResult
+from procedures.spindown.plan import Plan
 
 ROOT = Path(__file__).parents[2]
 
@@ -141,3 +144,12 @@ def test_neither_a_procedure_nor_a_run(bench: Bench) -> None:
     status, out, err = bench("run")
     assert (status, out) == (2, "")
     assert "expected PROCEDURE and --rig RIG, or --continue RUN" in err
+
+
+def test_a_run_of_the_machine_is_made_anew_on_the_machine(tmp_path: Path) -> None:
+    """Of a recording of the simulation, which says that it is one of the machine."""
+    path = stopped_after(0, tmp_path / "runs", Request("spindown", "tsbs12", seed=1)).directory
+    recording = Recording.open(path / "recording.mcap", Plan)
+    assert stopped.anew(recording) == "`bench run spindown --rig tsbs12`"
+    recording.run["backend"] = "live"
+    assert stopped.anew(recording) == "`bench run spindown --rig tsbs12 --backend live`"
