@@ -18,7 +18,7 @@ GROUPS = {
     REAL_TIME: ("tests/links/", "tests/firmware/", "tests/cli/test_serve.py", "tests/drivers/test_heartbeat",
                 "tests/drivers/test_live_link.py", "tests/drivers/test_fieldbus_live.py",
                 "test_docs.py::test_commands_work[serve-a-rig]", "test_docs.py::test_commands_work[connect-a-rig]",
-                "test_docs.py::test_commands_work[add-a-device]"),
+                "test_docs.py::test_commands_work[connect-a-stage]", "test_docs.py::test_commands_work[add-a-device]"),
     # They begin with the same calibrations, which are made once.
     "identified": ("tests/procedures/test_amb_calibration.py", "tests/procedures/test_amb_facts.py",
                    "tests/procedures/test_force_constant.py", "tests/procedures/test_force_coupling.py",

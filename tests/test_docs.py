@@ -52,9 +52,10 @@ COPIED = ("bench", "drivers", "procedures", "reports", "sim_backend", "rigs", "s
 
 LONG = (
     "add-a-device", "adopt-a-calibration", "amb-calibration", "angle-step", "balance", "bearing-model", "change-a-plan",
-    "coast-down", "compare", "compensation", "connect-a-rig", "current-step", "first-calibration", "force-constant",
-    "force-coupling", "inject-faults", "lift-off", "maximum-speed", "model", "negative-stiffness", "run-a-campaign", "run-up",
-    "sensitivity", "slew", "spindown", "step", "torque-constant", "tracking", "trend", "use-in-ci", "watch-a-run",
+    "coast-down", "compare", "compensation", "connect-a-rig", "connect-a-stage", "current-step", "first-calibration",
+    "force-constant", "force-coupling", "inject-faults", "lift-off", "maximum-speed", "model", "negative-stiffness",
+    "run-a-campaign", "run-up", "sensitivity", "slew", "spindown", "step", "torque-constant", "tracking", "trend",
+    "use-in-ci", "watch-a-run",
 )  # fmt: skip
 """Pages that take long, or that only run a procedure: by default `tests/procedures` takes each through its whole path and
 draws its figures, and `tests/cli` the same commands with their reports and calibrations."""

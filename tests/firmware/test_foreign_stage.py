@@ -1,8 +1,9 @@
 """A positioned stage that is not ours, over a DBC and an adapter of its own: at first contact, as processes, in real time. What
-the bench tells of it is held against what its controller does by itself (`stage_controller`)."""
+the bench tells of it is held against what its controller does by itself (`controller.py` beside its rig file)."""
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import subprocess
 import sys
@@ -10,7 +11,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-import stage_controller
 from line_programs import run_bench
 
 from bench.cli.abilities import abilities
@@ -19,14 +19,21 @@ from bench.rigfile import load_rig
 from bench.rigfile.check import check_rig
 from sim_backend.truth import draw
 
-HERE = Path(__file__).resolve().parent
-RIG = HERE.parent / "strangers" / "chariot.toml"
+STAGE = Path(__file__).resolve().parents[2] / "examples" / "linear-stage"
+RIG = STAGE / "chariot.toml"
+SPEC = importlib.util.spec_from_file_location("stage_controller", STAGE / "controller.py")
+assert SPEC is not None
+assert SPEC.loader is not None
+stage_controller = importlib.util.module_from_spec(SPEC)
+SPEC.loader.exec_module(stage_controller)
 
 
 @pytest.fixture
 def rig(tmp_path: Path) -> Iterator[str]:
     """The rig file with the addresses of a controller that runs."""
-    program = subprocess.Popen([sys.executable, str(HERE / "stage_controller.py")], stdout=subprocess.PIPE, text=True)
+    program = subprocess.Popen(
+        [sys.executable, str(STAGE / "controller.py"), "0", "0"], stdout=subprocess.PIPE, text=True
+    )
     try:
         assert program.stdout is not None
         bus, table = program.stdout.readline().split()

@@ -1,8 +1,7 @@
-"""A linear stage of another laboratory: its own controller behind an SLCAN adapter on TCP, tests/strangers/chariot.dbc packed
-by hand, and who reads its interferometer. It knows nothing of Levbench. 5 kg on a screw, Coulomb friction, a PID at 2 kHz, a
-set point on a ramp.
+"""A linear stage of another laboratory: its controller behind an SLCAN adapter on TCP, chariot.dbc packed by hand, and who
+reads its interferometer. It knows nothing of Levbench. 5 kg on a screw, Coulomb friction, a PID at 2 kHz, a set point on a ramp.
 
-    python stage_controller.py    # prints the ports of bus and table
+    python controller.py [BUS TABLE]    # ports, 0: any that is free; prints both
 """
 
 from __future__ import annotations
@@ -23,11 +22,8 @@ KP, KI, KD = 80_000.0, 6e6, 1_300.0
 TICK_S, TELEMETRY_TICKS, RAMP = 5e-4, 4, 0.05
 STILL, TURN = 1000, 5e-3  # ticks without a heartbeat; of the screw, m
 SCALE, WAVE = 25e-6, 1.5e-6  # the screw is too long by so much, and errs so far once a turn, m
-PLAY, SEAT, LASER = (
-    0.2e-6,
-    0.1e-6,
-    2e-8,
-)  # half the reversal, what each arrival differs by, and noise of the interferometer, m
+PLAY, SEAT = 0.2e-6, 0.03e-6  # half the reversal; what each arrival differs by, m
+LASER = 2e-8  # noise of the interferometer, m
 
 
 class Axe:
@@ -37,7 +33,7 @@ class Axe:
         self.tick = self.number = 0
         self.since, self.heard, self.current = 0, -1, 0.0
         self.noise = random.Random(7)
-        self.way, self.seat = 1.0, 0.0
+        self.way, self.seat, self.then = 1.0, 0.0, TENU
 
     def send(self, place: float) -> None:
         """A set point; where it is another one, the table will sit a little otherwise."""
@@ -58,10 +54,12 @@ class Axe:
             self._hold()
         elif code == 5 and self.mode in (TENU, VA):
             self.mode = PRET
-        elif code == 6 and self.mode in (TENU, VA, ORIGINE):
-            self.mode, self.since = FREINE, self.tick
-        elif code == 7 and self.mode != ARRET:
-            self.mode = PRET if self.fault == 0 else DEFAUT
+        elif code in (6, 7) and self.mode in (TENU, VA):
+            self.mode, self.since, self.then = FREINE, self.tick, TENU if code == 6 else ARRET
+        elif code in (6, 7) and self.mode == ORIGINE:
+            self.mode = PRET if code == 6 else ARRET
+        elif code == 7 and self.mode == PRET:
+            self.mode = ARRET
         elif code == 8 and self.mode == DEFAUT:
             self.mode, self.fault = ARRET, 0
 
@@ -90,9 +88,9 @@ class Axe:
             if self.mode in (TENU, VA):
                 self.mode = VA if self.wanted != self.target else TENU
             if self.mode == ORIGINE and self.wanted == 0.0 and self.tick - self.since > 3000:
-                self.mode, self.homed = TENU, True
+                self.mode, self.homed = PRET, True
             if self.mode == FREINE and self.tick - self.since > 400:
-                self.mode = PRET
+                self.mode = self.then
         self.current = force / NEWTON_PER_A
         free = force - VISCOUS * self.v
         if self.v == 0.0 and abs(free) <= RUB:
