@@ -6,10 +6,15 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import numpy.typing as npt
 
 from bench.errors import AnalysisError
 from bench.recording.source import Source
+
+LATE_S = (
+    0.5  # a block tells when its first samples came, to some 0.1 s: what is later than so much is no matter of blocks
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +49,18 @@ class Step:
     def lost(self, stream: str = "telemetry") -> int:
         """Samples of the stream that are missing from the step."""
         return self.recording.lost(stream, self.start_ns, self.end_ns)
+
+    def late(self, stream: str = "telemetry") -> tuple[int, float]:
+        """How many of its samples came LATE_S or more later than the timeliest of the recording, and how much later the latest
+        of them did, s."""
+        whole = [(block.host_ns - int(block.t_ns[0]), block.t_ns) for block in self.recording.blocks(stream)]
+        least = min((lateness for lateness, _ in whole), default=0)
+        count, most = 0, 0.0
+        for lateness, t_ns in whole:
+            low, high = np.searchsorted(t_ns, [self.start_ns, self.end_ns])
+            if high > low and (late := (lateness - least) * 1e-9) >= LATE_S:
+                count, most = count + int(high - low), max(most, late)
+        return count, most
 
 
 @dataclass(frozen=True)

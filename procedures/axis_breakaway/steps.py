@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from bench.errors import AnalysisError
 from bench.recording import Recording, Step
 from bench.rigfile.roles import STATE
 from bench.rigfile.stage import StageAxis, axes_of
@@ -18,6 +17,7 @@ from procedures.axis_breakaway.plan import Plan
 from procedures.axis_breakaway.sequence import WAYS, beside, chosen, seen
 from procedures.stages import spread
 from procedures.stages.map_bends import currents, moves
+from procedures.stages.recorded import few
 
 Array = npt.NDArray[np.float64]
 FEWEST = 100  # samples of a ramp
@@ -77,7 +77,7 @@ def _ramp(recording: Recording[Plan], step: Step) -> Ramp:
     names = [c for a in axes_of(rig).values() for c in (a.channel, a.asked, a.given) if c] + list(currents(rig))
     data = step.read(*dict.fromkeys((*names, STATE)))
     if len(data[STATE]) < FEWEST:
-        raise AnalysisError(f"axis {axis.name}: found {len(data[STATE])} samples of a ramp; expected {FEWEST} or more")
+        raise few(f"axis {axis.name}", f"{len(data[STATE])} samples of a ramp", FEWEST, step)
     t, known = (data["t_ns"] - data["t_ns"][:1]) * 1e-9, rig.choices(STATE)
     sign = {name: turned if turned and spread.turns(a) else int(labels["way"]) for name, a in watched.items()}
     found = {name: broke_away(sign[name] * data[a.channel], seen(a)) for name, a in watched.items()}

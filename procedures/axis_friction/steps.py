@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from bench.errors import AnalysisError
 from bench.recording import Recording, Step
 from bench.rigfile.roles import STATE
 from bench.rigfile.stage import StageAxis, axes_of
@@ -16,6 +15,7 @@ from procedures.axis_friction.moves import HELIX, PASS
 from procedures.axis_friction.plan import Plan
 from procedures.axis_friction.sequence import window
 from procedures.stages.map_bends import currents, moves
+from procedures.stages.recorded import few
 
 Array = npt.NDArray[np.float64]
 FEWEST = 20  # samples in a window
@@ -71,8 +71,8 @@ def _pass(recording: Recording[Plan], step: Step) -> Pass:
     at = data[axis.channel]
     within = np.flatnonzero((at >= low) & (at <= high))
     if len(within) < FEWEST:
-        raise AnalysisError(f"axis {axis.name} at {labels['rate']}: found {len(within)} samples between {low:.4g} and "
-                            f"{high:.4g} {axis.unit}; expected {FEWEST} or more")  # fmt: skip
+        found = f"{len(within)} samples between {low:.4g} and {high:.4g} {axis.unit}"
+        raise few(f"axis {axis.name} at {labels['rate']}", found, FEWEST, step)
     t, forces = data["t_ns"][within] * 1e-9, {a.name: data[a.given or a.asked][within] for a in axes.values()}
     inside = {c: data[c][within] for c in currents(recording.rig)}
     known = recording.rig.choices(STATE)

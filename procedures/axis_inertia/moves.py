@@ -25,7 +25,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
         for axis in axes:
             for repeat in range(plan.repeats):
                 _stand(rig, plan, axis, repeat)
-                for tone in tones(axis, plan):
+                for tone in tones(axis, plan, name):
                     _play(rig, plan, record, axis, tone, {"repeat": repeat, "part": name})
         if name:
             _mount(rig, BARE)

@@ -20,7 +20,7 @@ from bench.rigfile.stage import axes_of
 from procedures.axis_inertia.moves import acquire
 from procedures.axis_inertia.plan import Plan
 from procedures.axis_inertia.requires import requires
-from procedures.axis_inertia.sequence import chosen, known, plays, tones
+from procedures.axis_inertia.sequence import chosen, known, part, plays, tones
 from procedures.axis_inertia.sequence import step_count as counted
 from procedures.axis_inertia.steps import read_sines
 from procedures.stages import assumptions
@@ -79,7 +79,7 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
             yield f"{axis.name}: found no {known(axis, plan)} among the machine's numbers; expected what the part adds"
         wave = axis.wave
         assert wave is not None
-        for tone in tones(axis, plan):
+        for tone in (*tones(axis, plan), *tones(axis, plan, part(axis, plan))):
             wanted = {wave.amplitude: tone.amplitude, wave.period: 1 / tone.hz}
             if not turns(axis):
                 wanted[axis.target] = middle(axis) + tone.amplitude

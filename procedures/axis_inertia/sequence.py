@@ -41,10 +41,13 @@ def chosen(rig: RigFile, plan: Plan) -> tuple[StageAxis, ...]:
     return tuple(a for a in axes_of(rig).values() if plays(a) and (not plan.axes or a.name in plan.axes))
 
 
-def tones(axis: StageAxis, plan: Plan) -> tuple[Tone, ...]:
-    """Of an axis."""
-    some: Tones = plan.tones_rad if turns(axis) else plan.tones_m
-    return tuple(Tone(k, amplitude, hz) for k, (amplitude, hz) in enumerate(some))
+def tones(axis: StageAxis, plan: Plan, on: str = BARE) -> tuple[Tone, ...]:
+    """Of an axis with a part `on`: as great as without it, and so much slower that they ask for little more force. So currents
+    are about as great, and what makes a newton of great ones another share of the map's all but falls out with the map."""
+    around = turns(axis)
+    some: Tones = plan.tones_rad if around else plan.tones_m
+    share = (plan.slower_rad if around else plan.slower_m) if on else 1.0
+    return tuple(Tone(k, amplitude, share * hz) for k, (amplitude, hz) in enumerate(some))
 
 
 def part(axis: StageAxis, plan: Plan) -> Part:

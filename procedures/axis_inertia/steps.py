@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from bench.errors import AnalysisError
 from bench.recording import Recording, Step
 from bench.rigfile.roles import STATE
 from bench.rigfile.stage import axes_of
@@ -16,6 +15,7 @@ from procedures.axis_inertia import fit
 from procedures.axis_inertia.moves import TONE, recorded_s
 from procedures.axis_inertia.plan import Plan
 from procedures.stages.map_bends import currents, moves
+from procedures.stages.recorded import few
 
 Array = npt.NDArray[np.float64]
 FEWEST = 200  # samples of a sine
@@ -69,8 +69,7 @@ def _sine(recording: Recording[Plan], step: Step) -> Sine:
     t = (data["t_ns"] - data["t_ns"][:1]) * 1e-9
     within = t < recorded_s(recording.plan, hz) - 1e-6
     if np.count_nonzero(within) < FEWEST:
-        raise AnalysisError(f"axis {axis.name} at {hz:g} Hz: found {np.count_nonzero(within)} samples; expected "
-                            f"{FEWEST} or more")  # fmt: skip
+        raise few(f"axis {axis.name} at {hz:g} Hz", f"{np.count_nonzero(within)} samples", FEWEST, step)
     known = rig.choices(STATE)
     inside = {name: values[within] for name, values in data.items()}
     force = inside[axis.given or axis.asked]

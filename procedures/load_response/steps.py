@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from bench.errors import AnalysisError
 from bench.recording import Recording, Step
 from bench.rigfile.roles import STATE
 from bench.rigfile.stage import StageAxis, axes_of
 from procedures.load_response.moves import APPROACH, DISTURBED
 from procedures.load_response.plan import Plan
 from procedures.load_response.sequence import count
+from procedures.stages.recorded import few
 
 Array = npt.NDArray[np.float64]
 AT_LIMIT = 0.98  # of the greatest force: from here on it is at its limit
@@ -101,7 +101,7 @@ def _told(recording: Recording[Plan], step: Step) -> tuple[dict[str, npt.NDArray
     names = dict.fromkeys(c for c in (axis.channel, axis.reference, axis.asked, axis.given, STATE) if c)
     data = step.read(*names)
     if len(data[axis.channel]) < FEWEST:
-        raise AnalysisError(f"step {dict(labels)}: found {len(data[axis.channel])} samples; expected {FEWEST} or more")
+        raise few(f"step {dict(labels)}", f"{len(data[axis.channel])} samples", FEWEST, step)
     known = recording.rig.choices(STATE)
     states = tuple(known.get(int(code), str(int(code))) for code in np.unique(data[STATE]))
     limit, force = float(labels["limit"]), np.abs(data[axis.asked])
