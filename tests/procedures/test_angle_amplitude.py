@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 from bench.rigfile import load_rig
@@ -14,12 +15,13 @@ from procedures.shared.certificates import certified_sensors
 from procedures.shared.greater import greater
 
 RIG = load_rig("tsbs6")
+Array = npt.NDArray[np.float64]
 TICK, NOISE = 1e-4, 1.5e-3 * 10**0.5  # s; A of a reading, a sample of telemetry is a mean of ten
 MACHINE = conventions(RIG)
 SENSORS = certified_sensors(RIG, {name: name for name in MACHINE.segments})
 
 
-def swing(vectors: np.ndarray) -> Swing:
+def swing(vectors: Array) -> Swing:
     """Of what the sensors read, (2, 2, n) A."""
     still = np.zeros((2, vectors.shape[-1]))
     return Swing(np.arange(vectors.shape[-1]) * TICK, {}, vectors, 10.0, still[0], still, still, 1.0)
@@ -71,7 +73,7 @@ def test_a_segment_that_is_far_below_has_no_part_in_it() -> None:
 @pytest.mark.parametrize(
     "approach", [np.zeros(80), -4.0 * np.exp(-1.26 * np.arange(4)), -4.0 * np.exp(-0.02 * np.arange(300))]
 )
-def test_what_noise_raises_the_largest_of_readings_by_is_taken_off(approach: np.ndarray) -> None:
+def test_what_noise_raises_the_largest_of_readings_by_is_taken_off(approach: Array) -> None:
     """80 readings at the limit, four on their way to it, and 300 that approach it: within 2.5 mA in the mean (half of
     s sqrt(2 ln n), which was taken off, left 4 mA of 80)."""
     random, off = np.random.default_rng(2), []
@@ -97,7 +99,7 @@ def test_ticks_of_a_cut_count_once() -> None:
     """Ten steps all alike: one in some may be a tick off, u = tick/10. One of them a tick off: u by their scatter, which has
     eight degrees of freedom and is as much, and nothing beside it."""
     alike = captured._cut("here", [[9e-4] * 5, [8e-4] * 5], TICK)
-    assert (alike.value, alike.u) == (pytest.approx(8.5e-4), pytest.approx(TICK / 10))
+    assert [alike.value, alike.u] == pytest.approx([8.5e-4, TICK / 10])
     one = captured._cut("here", [[9e-4] * 4 + [10e-4], [8e-4] * 5], TICK)
-    assert (one.value, one.u) == (pytest.approx(8.6e-4), pytest.approx(TICK / 10))
+    assert [one.value, one.u] == pytest.approx([8.6e-4, TICK / 10])
     assert [i.dof for i in one.sensitivities] == [8.0]
