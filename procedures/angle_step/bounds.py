@@ -23,11 +23,10 @@ from bench.errors import AnalysisError
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.rigfile.roles import ANGLE, resolved
-from bench.uncertainty import Estimate, Influence
+from bench.uncertainty import Estimate
 from procedures.angle_step.budget import within
-from procedures.servomotor.conventions import Servomotor, conventions, displacement
+from procedures.servomotor.conventions import conventions, displacement
 from procedures.servomotor.parameters import stated
-from procedures.shared.certificates import certified_sensors
 
 Array = npt.NDArray[np.float64]
 ASKED = ("across", "along", "torque")
@@ -160,59 +159,16 @@ def read_swing(recording: Recording[Any], number: object) -> Swing | None:
     )
 
 
-@dataclass(frozen=True)
-class Largest:
-    """The greatest amplitude of one step, A; q and d (2,) A there, which segment's, and what noise may add to it, A."""
-
-    amplitude: float
-    vector: Array
-    segment: int
-    floor: float
-
-
-def largest(swing: Swing, offsets: Array, gains: Array, noise: float) -> Largest:
-    """By true currents: `offsets` (k, 2) A and `gains` (k, 2) of the sensors. Samples are taken as they are: the derivative of
-    an encoder's counts makes currents jump from tick to tick. The largest of n alike exceeds them by their `noise`, A, times
-    sqrt(2 ln n) at most."""
-    true = (swing.vectors - offsets[:, :, None]) / gains[:, :, None]
-    size = np.hypot(true[:, 0], true[:, 1])
-    segment, at = (int(k) for k in np.unravel_index(int(np.argmax(size)), size.shape))
-    near = int((size >= size.max() - 3 * noise).sum())
-    return Largest(float(size[segment, at]), true[segment, :, at], segment, noise * math.sqrt(2 * math.log(near)))
-
-
 def estimates(where: str, swings: Sequence[Swing], rig: RigFile, at_bound: bool) -> dict[str, Estimate]:
-    """`amplitude`, A, and where the torque current is held `at_bound` `bound_excess`, A: means over the steps of a case;
-    nothing of a motor whose segments carry no vectors."""
-    if not bounded(rig):
+    """`bound_excess`, A, where the torque current is held `at_bound`: a mean over the steps of a case; nothing of a motor whose
+    segments carry no vectors."""
+    if not (bounded(rig) and at_bound):
         return {}
-    machine = conventions(rig)
-    sensors = certified_sensors(rig, {name: name for name in machine.segments})
-    gains, offsets = (np.array([[sensors[f"{key}_{c}"].value for c in pair] for pair in machine.vectors])
-                      for key in ("gain", "offset"))  # fmt: skip
-    found = [largest(s, offsets, gains, noise_of(rig, machine.segments, 1 / float(s.t[1]))) for s in swings]
-    floor = float(np.mean([f.floor for f in found]))
-    out = {"amplitude": _scattered(f"amplitude/{where}", [f.amplitude for f in found]) - floor / 2
-           + within(f"noise/amplitude/{where}", "noise in the greatest amplitude", floor / 2, "A")}  # fmt: skip
-    out["amplitude"] = out["amplitude"] + _sensed(found, machine, sensors)
-    if at_bound:  # the greatest of many lies in the upper half of what rounding does
-        half = float(np.mean([s.rounding for s in swings])) / 2
-        rounding = within(f"rounding/{where}", "rounding of what the law tells", half, "A")
-        out["bound_excess"] = Estimate.exact(float(np.mean([s.excess for s in swings])) - half, "A") + rounding
-    return out
-
-
-def _sensed(found: Sequence[Largest], machine: Servomotor, sensors: Mapping[str, Estimate]) -> Estimate:
-    """Zero, with what gains and offsets of the sensors do: da = -(q (q dg_q + do_q) + d (d dg_d + do_d))/a."""
-    out = Estimate.exact(0.0, "A")
-    for k, pair in enumerate(machine.vectors):
-        for part, channel in enumerate(pair):
-            hit = [f for f in found if f.segment == k]
-            by_offset = sum(float(f.vector[part]) / f.amplitude for f in hit) / len(found)
-            by_gain = sum(float(f.vector[part]) ** 2 / f.amplitude for f in hit) / len(found)
-            gain, offset = sensors[f"gain_{channel}"], sensors[f"offset_{channel}"]
-            out = out - (gain - gain.value) * by_gain - (offset - offset.value) * by_offset
-    return Estimate(out.value, "A", out.sensitivities)
+    half = (
+        float(np.mean([s.rounding for s in swings])) / 2
+    )  # the greatest of many lies in the upper half of what rounding does
+    rounding = within(f"rounding/{where}", "rounding of what the law tells", half, "A")
+    return {"bound_excess": Estimate.exact(float(np.mean([s.excess for s in swings])) - half, "A") + rounding}
 
 
 def noise_of(rig: RigFile, channels: Sequence[str], rate_hz: float) -> float:
@@ -220,10 +176,3 @@ def noise_of(rig: RigFile, channels: Sequence[str], rate_hz: float) -> float:
     period = rig.messages[rig.binding.telemetry[0]].period_s or 1 / rate_hz
     stated = [rig.channels[c].noise or 0.0 for c in channels]
     return max(stated) * math.sqrt(max(period * rate_hz, 1.0))
-
-
-def _scattered(identity: str, values: Sequence[float]) -> Estimate:
-    u = float(np.std(values, ddof=1)) / math.sqrt(len(values))
-    influence = Influence(id=f"scatter/{identity}", name="scatter of the repeats", u=u, unit="A", kind="A",
-                          distribution="normal", dof=float(len(values) - 1), source=f"{len(values)} steps")  # fmt: skip
-    return Estimate.of(float(np.mean(values)), influence)

@@ -3,8 +3,8 @@
 The response of the angle is a mean over both ways. Where a step begins within its encoder's count, and how far the angle's
 integrator has learned by then, goes on from step to step in the same way each time, and is no error. How far steps are off that
 trend is: it is noise, of the reading as of the machine, and near the end of its levitation, with amplifiers that cut, most of
-what is not known. What is off in all steps alike has a term of its own. The shaft's path has noise, and its uncertainty what
-the steps of one way differ by.
+what is not known. What is off in all steps alike has a term of its own. The shaft's path has noise, and its uncertainty is what
+its mean says without one of the steps.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
-from procedures.angle_step import bounds, steps
+from procedures.angle_step import amplitude, bounds, steps
 from procedures.angle_step.budget import OUTBOARD, at_motor, gained, within
 from procedures.angle_step.fine import Fine, fine
 from procedures.angle_step.paths import Peak, peak_of
@@ -85,17 +85,23 @@ def _estimates(
         "final_error": _final(where, found, done, count, kp),
         **_peaks(where, found, done, rig),
         **bounds.estimates(where, swings, rig, case.allocation == "priority"),
+        **(amplitude.estimates(where, swings, rig) if bounds.bounded(rig) else {}),
     }  # fmt: skip
     cut = [f.saturated for f in found if f.saturated is not None]
     if len(cut) == len(found):
-        out["saturated"] = _scattered(f"saturated/{where}", "s", _ways(found, cut)) + _alike(where, tick / len(cut))
+        out["saturated"] = _cut(where, _ways(found, cut), tick)
     return out
 
 
-def _alike(where: str, u: float) -> Estimate:
-    """Zero, with what counts that are alike do not show: a step of them all may be a tick off."""
-    influence = Influence(f"ticks/cut/{where}", "ticks of a cut", u, "s", "B", "normal")
-    return Estimate.of(0.0, influence)
+def _cut(where: str, ways: Sequence[Sequence[float]], tick: float) -> Estimate:
+    """The mean of how long an amplifier cut, s, by whole ticks. Steps that are all alike do not show how rarely one is a tick
+    off: the share that is lies within 2/n of n (0.217 of 10: Jeffreys, Beta(1/2, n + 1/2) at 97.5 %), which is u = tick/n.
+    Where counts scatter by that or more, they show it themselves."""
+    seen = _scattered(f"saturated/{where}", "s", ways)
+    u = tick / sum(map(len, ways))
+    if seen.u >= u:
+        return seen
+    return Estimate.of(seen.value, Influence(f"ticks/cut/{where}", "ticks of a cut", u, "s", "B", "normal"))
 
 
 def _loose(where: str, found: Sequence[Fine]) -> Estimate:
@@ -163,7 +169,12 @@ def _peak(identity: str, ways: Sequence[Peak]) -> Estimate:
     """The mean of the peaks of both ways, less what noise adds to them, m."""
     by, off = (float(np.mean(values)) for values in ([p.raised.by for p in ways], [p.raised.off for p in ways]))
     left = within(f"raised/{identity}", "noise in a peak", off, "m")
-    return _scattered(f"peak/{identity}", "m", [p.each for p in ways]) + left - by
+    u = math.sqrt(sum(p.variance for p in ways)) / len(ways)
+    steps = [len(p.without) for p in ways]
+    found = _typed(
+        f"peak/{identity}", "m", float(np.mean([p.radius for p in ways])), u, sum(steps) - len(ways), sum(steps)
+    )
+    return found + left - by
 
 
 def _scattered(identity: str, unit: str, ways: Sequence[Sequence[float] | Array]) -> Estimate:
@@ -178,9 +189,13 @@ def _repeated(identity: str, unit: str, ways: Sequence[Sequence[float] | Array],
     """Mean over both ways, each step of which has noise `s`."""
     parts = [np.asarray(p, float) for p in ways]
     u = s * math.sqrt(sum(1 / len(p) for p in parts)) / len(parts)
+    return _typed(identity, unit, float(np.mean([p.mean() for p in parts])), u, dof, sum(map(len, parts)))
+
+
+def _typed(identity: str, unit: str, value: float, u: float, dof: int, steps: int) -> Estimate:
     influence = Influence(id=f"scatter/{identity}", name="scatter of the repeats", u=u, unit=unit, kind="A",
-                          distribution="normal", dof=float(dof), source=f"{sum(map(len, parts))} steps")  # fmt: skip
-    return Estimate.of(float(np.mean([p.mean() for p in parts])), influence)
+                          distribution="normal", dof=float(dof), source=f"{steps} steps")  # fmt: skip
+    return Estimate.of(value, influence)
 
 
 def _read(identity: str, name: str, u: float, unit: str) -> Estimate:

@@ -2,6 +2,12 @@
 
 One step's greatest distance holds what noise did in it, of the sensors and of the loop that follows them: a shaft that is told
 a wrong place goes there, and its sensors do not show it. The mean of some steps has little of either.
+
+How well the greatest distance of a mean is known, the means that leave one of its steps out say (jackknife): u^2 = (k - 1)/k
+sum (r_j - mean r)^2. What the steps differ by at the moment of the peak would say too much. A path that stays near its greatest
+distance for long, as with priority, has several places that are about as far, and the largest of n that vary by s by themselves
+varies less: by 0.83 s of two, 0.75 s of three. (The jackknife of a greatest value is too great too, but by less: u of
+priority's peaks is 1.1 times what signs drawn for the steps' residuals give, and was 1.35 times.)
 """
 
 from __future__ import annotations
@@ -30,20 +36,27 @@ class Raised:
 
 @dataclass(frozen=True)
 class Peak:
-    """The greatest distance of a mean path off centre, m, its direction (2,), by how much noise has `raised` it, and how far
-    along that direction each step was then, `each` (k,) m."""
+    """The greatest distance of a mean path off centre, m, its direction (2,), by how much noise has `raised` it, and that
+    distance of the mean path `without` each step, (k,) m."""
 
     radius: float
     towards: Array
     raised: Raised
-    each: Array
+    without: Array
+
+    @property
+    def variance(self) -> float:
+        """Of the distance, by the steps, m^2."""
+        return (len(self.without) - 1) * float(self.without.var())
 
 
 def peak_of(paths: Sequence[Array], noise: float) -> Peak:
     """Of paths (2, n) m of steps that are alike, from one moment on; `noise` m of a reading."""
     stack = np.array([path[:, : min(p.shape[1] for p in paths)] for path in paths])
-    radius, towards, raised, at = peak_in_noise(stack.mean(axis=0), noise / math.sqrt(len(stack)))
-    return Peak(radius, towards, raised, np.tensordot(smoothed(stack)[..., at], towards, axes=(1, 0)))
+    radius, towards, raised = peak_in_noise(stack.mean(axis=0), noise / math.sqrt(len(stack)))
+    each = smoothed(stack)
+    others = (each.sum(axis=0) - each) / (len(each) - 1)
+    return Peak(radius, towards, raised, np.hypot(others[:, 0], others[:, 1]).max(axis=1))
 
 
 def smoothed(x: Array, ticks: int = SMOOTH) -> Array:
@@ -54,9 +67,9 @@ def smoothed(x: Array, ticks: int = SMOOTH) -> Array:
     return out
 
 
-def peak_in_noise(orbit: Array, noise: float) -> tuple[float, Array, Raised, int]:
-    """Greatest distance off centre of a path (2, n), m, its direction (2,), by how much noise raises it, and its place in n: as
-    much as drawn noise raises the peak of a smoother curve. Noise on top of what was read would say too much, for where a peak
+def peak_in_noise(orbit: Array, noise: float) -> tuple[float, Array, Raised]:
+    """Greatest distance off centre of a path (2, n), m, its direction (2,), and by how much noise raises it: as much as
+    drawn noise raises the peak of a smoother curve. Noise on top of what was read would say too much, for where a peak
     is round, the first noise raises it less than what follows. Each draw is taken with both signs: their mean is nothing at any
     tick."""
     smooth = smoothed(orbit)
@@ -65,7 +78,7 @@ def peak_in_noise(orbit: Array, noise: float) -> tuple[float, Array, Raised, int
     half = smoothed(np.random.default_rng(0).normal(0.0, noise, (DRAWS // 2, *orbit.shape)))
     drawn = np.concatenate([half, -half])
     by, other = (_raised(curve, drawn) for curve in _beneath(orbit, noise))
-    return float(radius[k]), smooth[:, k] / max(float(radius[k]), 1e-300), Raised(by, abs(by - other)), k
+    return float(radius[k]), smooth[:, k] / max(float(radius[k]), 1e-300), Raised(by, abs(by - other))
 
 
 def _beneath(orbit: Array, noise: float) -> tuple[Array, Array]:

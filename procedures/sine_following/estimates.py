@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from bench.rigfile.stage import StageAxis
 from bench.uncertainty import Estimate, Influence
-from bench.uncertainty.estimate import Array, Deviations
+from procedures.shared.greater import greater
 from procedures.sine_following.fit import Followed, Largest, followed
 from procedures.sine_following.plan import Plan
 from procedures.sine_following.steps import Ride, amplitude
@@ -93,25 +92,12 @@ def _rounded(identity: str, values: Sequence[float], left: Sequence[float], unit
 
 def truly(g: Group, ahead: Estimate, behind: Estimate, plan: Plan) -> Estimate:
     """The largest true error. Edges of counts that lie off the zero make the error larger to one side and smaller to the other,
-    so that the larger of both grows either way: the greater of two normal numbers, Clark (1961)."""
+    so that the larger of both grows either way."""
     axis, size = g.axis, amplitude(g.axis, plan)
     constant = edges(axis)
     up = ahead - constant - erred(axis, f"{g.where}/ahead") + stretched(axis, size)
     down = behind + constant - erred(axis, f"{g.where}/behind") + stretched(axis, size)
-    apart = math.hypot(*(up - down).contributions.values())
-    a = (up.value - down.value) / apart if apart > 0 else math.inf * (1 if up.value >= down.value else -1)
-    share = 0.5 * (1 + math.erf(a / math.sqrt(2)))
-    density = math.exp(-a * a / 2) / math.sqrt(2 * math.pi) if math.isfinite(a) else 0.0
-    value = up.value * share + down.value * (1 - share) + apart * density
-    parts: dict[Influence, float] = {}
-    for weight, estimate in ((share, up), (1 - share, down)):
-        for influence, c in estimate.sensitivities.items():
-            parts[influence] = parts.get(influence, 0.0) + weight * c
-
-    def sampler(deviations: Deviations) -> Array:
-        return np.asarray(np.maximum(up.sampled(deviations), down.sampled(deviations)))
-
-    return Estimate(value, axis.unit, parts, sampler)
+    return greater(up, down)
 
 
 def half(g: Group) -> float:

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy import signal
 
 from bench.cli.motion_truth import truth_of_motion
 from bench.cli.virtual import Simulated, simulated_run
@@ -24,7 +23,6 @@ from bench.run.evaluation import evaluate
 from bench.uncertainty import Estimate, interval
 from procedures.angle_step import bounds, checks, estimates
 from procedures.angle_step.bounds import Swing
-from procedures.angle_step.paths import peak_in_noise, peak_of
 from procedures.angle_step.plan import Plan
 from procedures.angle_step.procedure import _loop, planned, procedure
 from procedures.angle_step.steps import Done, read_moves
@@ -100,36 +98,6 @@ def test_a_capture_that_ends_before_its_step_is_said(nominal_run: Simulated, sec
     ]
     assert [f.effect for f in said] == [Effect.INDETERMINATE] * (2 if short else 0)
     assert all(("amplitude" in r.estimates) is not bool(short) for r in found.values())
-
-
-@pytest.mark.parametrize(("seconds", "height"), [(0.004, 8e-6), (0.02, 2e-6), (0.03, 1e-6)])
-def test_what_noise_adds_to_a_peak_is_taken_off(seconds: float, height: float) -> None:
-    """Half a sine by itself, sharp and far above the noise, or round and nearer to it: known before noise is drawn, and found
-    in the mean within a tenth of the noise and what the parabola leaves of a sharp one, 1 %."""
-    noise, ticks = 0.16e-6, 4000
-    t = (np.arange(ticks) - ticks / 2) * 1e-4
-    arc = np.where(np.abs(t) < seconds / 2, height * np.cos(np.pi * t / seconds), 0.0)
-    clean, random = np.array([0.6 * arc, 0.8 * arc]), np.random.default_rng(3)
-    found = [peak_in_noise(clean + random.normal(0.0, noise, clean.shape), noise) for _ in range(40)]
-    off = float(np.mean([radius - raised.by for radius, _, raised, _ in found])) - height
-    assert abs(off) < 0.1 * noise + (0.01 * height if seconds < 0.01 else 0.0)
-    assert all(raised.off < noise for _, _, raised, _ in found)
-
-
-def test_a_mean_path_has_little_of_what_a_loop_does_with_noise() -> None:
-    """A shaft that follows 50 nm of slow noise, which its sensors do not show: one step's own peak is higher by it, that of the
-    mean of ten, each longer than the next, by less than half as much; each step is told as far as it was where the mean is
-    farthest."""
-    t, random = np.arange(4000) * 1e-4, np.random.default_rng(5)
-    arc = 1e-6 * np.exp(-(((t - 0.1) / 0.03) ** 2))
-    slow = [signal.lfilter(*signal.butter(2, 150, fs=1e4), random.normal(0.0, 0.3e-6, (2, 4000))) for _ in range(10)]
-    paths = [np.array([0 * arc, arc])[:, : 4000 - k] + s[:, : 4000 - k] for k, s in enumerate(slow)]
-    alone = float(np.mean([peak_in_noise(p, 1e-9)[0] for p in paths])) - 1e-6
-    together = peak_of(paths, 1e-9)
-    assert alone > 60e-9
-    assert 0 < together.radius - 1e-6 < alone / 2
-    assert together.each.mean() == pytest.approx(together.radius)
-    assert 20e-9 < together.each.std() < 100e-9
 
 
 def test_its_figures_show_torque_within_its_bound(nominal_run: Simulated) -> None:
@@ -248,18 +216,6 @@ def test_telemetry_alone_says_the_same_within_its_interval(nominal_run: Simulate
         at, true = interval(told[name]), truth[f"{name}@{where}"]
         assert at.low <= true <= at.high, name
         assert 0 < at.U < widest, name
-
-
-def test_the_largest_amplitude_is_freed_of_sensors_and_noise() -> None:
-    """q1 = 8, d1 = -6: 10 A; gains 1.01 and offsets 0.05 A are taken off, and so is half of what noise may add."""
-    s = swing(6.0, 4.0, 4.0)
-    gains, offsets = np.full((2, 2), 1.01), np.full((2, 2), 0.05)
-    read = replace(s, vectors=s.vectors * 1.01 + 0.05)
-    found = bounds.largest(read, offsets, gains, 0.0)
-    assert (found.amplitude, found.segment) == (pytest.approx(10.0), 0)
-    assert found.vector == pytest.approx([8.0, -6.0])
-    noisy = [bounds.largest(swing(6.0, 4.0, 4.0, 5e-3), np.zeros((2, 2)), np.ones((2, 2)), 5e-3)]
-    assert noisy[0].amplitude - noisy[0].floor / 2 == pytest.approx(10.0, abs=8e-3)
 
 
 def test_static_steps_may_be_others() -> None:
