@@ -1,5 +1,5 @@
 """A linear stage of another laboratory: its controller behind an SLCAN adapter on TCP, chariot.dbc packed by hand, and who
-reads its interferometer. It knows nothing of Levbench. 5 kg on a screw, Coulomb friction, a PID at 2 kHz, a set point on a ramp.
+reads its interferometer. It knows nothing of Levbench. 5 kg on a screw, with friction; a PID at 2 kHz, a set point on a ramp.
 
     python controller.py [BUS TABLE]    # ports, 0: any that is free; prints both
 """

@@ -20,9 +20,8 @@ class Plan(BenchPlan):
     tones_rad: Tones = Field(((0.8, 1.5), (0.1, 3.0)), min_length=2)
     part_m: Part = "bar"  # that is added, by its name among the known parts
     part_rad: Part = "ring"
-    slower_m: float = Field(
-        0.8, gt=0
-    )  # sines' rate with the part on, as a share: from root to fourth root of J/(J + P)
+    # Rate of the sines with the part on, as a share: from the root to the fourth root of J/(J + P).
+    slower_m: float = Field(0.8, gt=0)
     slower_rad: float = Field(0.8, gt=0)
     repeats: int = Field(8, ge=4)  # of everything, at as many places
     spread_m: float = Field(5e-3, ge=0)  # to each side of the middle of the travel: where an axis in m stands meanwhile
