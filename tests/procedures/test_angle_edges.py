@@ -118,7 +118,7 @@ def test_a_peak_is_freed_of_what_noise_adds(height: float) -> None:
     off, kept = [], []
     for seed in range(12):
         noise = np.random.default_rng(seed).normal(0, 1.6e-7, (2, 4000))
-        peak, towards, raised, _ = peak_in_noise(np.array([0 * T, flat]) + noise, 1.6e-7)
+        peak, towards, raised = peak_in_noise(np.array([0 * T, flat]) + noise, 1.6e-7)
         off.append(peak - raised.by - height)
         kept.append(peak - height)
         assert towards == pytest.approx((0.0, 1.0), abs=0.15)
