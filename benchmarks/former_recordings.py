@@ -56,6 +56,9 @@ def main() -> int:
         old = (asked.keep or Path(scratch)).resolve() / "old"
         tree = old if old.is_dir() else golden.checked_out(old, asked.old)
         for name in names:
+            if not list((tree / "procedures").glob(f"{name.replace('-', '_')}*")):
+                print(f"{name}: not in that commit", flush=True)
+                continue
             found = compared(name, tree, asked.seed)
             failed |= not found.read
             print(*found.lines, sep="\n  ", flush=True)
