@@ -98,9 +98,7 @@ class ControllerCapture:
             )
         if status != "OK":
             asked = f"channels {', '.join(layout.channels)}; trigger {waits_for(trigger)}; {length} samples"
-            told = (
-                f"; its memory is {reply['memory']:.0f} bytes" if reply["memory"] else ""
-            )  # a command line tells none
+            told = f"; its memory is {reply['memory']:.0f} bytes" if reply["memory"] else ""
             raise BenchError(f"capture: the controller refuses it: {status}; asked for were {asked}{told}")
         self._armed = layout, trigger, int(reply["number"])
 

@@ -3,6 +3,7 @@ What is measured at a channel goes by the channel's name there."""
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,8 @@ from bench.findings import Finding
 from bench.procedure import Measured
 from bench.rigfile import load_rig
 from bench.rigfile.check import check_rig
+from bench.rigfile.tomltext import to_toml
+from sim_backend.controller.controls import controls
 from sim_backend.truth import draw
 
 LONG = pytest.mark.long
@@ -61,6 +64,19 @@ def test_the_numbers_are_the_same(
     assert [f.code for f in here.results if isinstance(f, Finding)] == [
         f.code for f in there.results if isinstance(f, Finding)
     ]
+
+
+def test_parameters_of_a_setting_in_another_order_are_heard_as_what_they_are(tmp_path: Path) -> None:
+    """Of `integrators` the angle's comes first there; where each stands among its axis' parameters says whose it is."""
+    path = Path(named_otherwise("rlsrm", tmp_path))
+    table = tomllib.loads(path.read_text(encoding="utf-8"))
+    axes, parts = (table["capabilities"][key] for key in ("positioning", "settings"))
+    parts["integrators"] = {name: dict(reversed(of.items())) for name, of in parts["integrators"].items()}
+    path.write_text(to_toml(table), encoding="utf-8")
+    rig = load_rig(str(path))
+    known = controls(rig, draw(rig, 1).machine)
+    for axis in ("x", "angle"):
+        assert [c.name for c in known[axes["axes"][axis]["integral"]]] == [f"ki_{axis}"]
 
 
 def test_a_setting_by_another_name_is_refused_where_the_machine_would_not_hear_its_parameter(tmp_path: Path) -> None:

@@ -12,9 +12,8 @@ import numpy.typing as npt
 from bench.errors import AnalysisError
 from bench.recording.source import Source
 
-LATE_S = (
-    0.5  # a block tells when its first samples came, to some 0.1 s: what is later than so much is no matter of blocks
-)
+# A block tells when its first samples came, to some 0.1 s: what is later than so much is no matter of blocks.
+LATE_S = 0.5
 
 
 @dataclass(frozen=True, slots=True)

@@ -69,12 +69,18 @@ def _by_meaning(rig: RigFile, machine: Machine) -> Iterator[tuple[str, Control]]
     known = frozenset((*machine.controls, *OWN))
     if others := {place: name for place, name in _bound(rig).items() if name not in known}:
         meant = _meant(rig, machine)
-        yield from ((name, Control(meant[place])) for place, name in others.items() if place in meant)
+        by_name = {name for place, name in others.items() if place in meant and not place[-1].isdigit()}
+        for (
+            place,
+            name,
+        ) in others.items():  # a setting may have its parameters in another order: a name's own place counts
+            if place in meant and not (place[-1].isdigit() and name in by_name):
+                yield name, Control(meant[place])
 
 
 def without_control(rig: RigFile, machine: Machine) -> Iterator[tuple[str, str]]:
     """Capabilities that a machine with a law of its own does not have, by their keys, and the parameters that are bound to
-    them: of bearings and axes that it knows by other names."""
+    them: of bearings, axes and settings that it knows by other names."""
     known = frozenset((*machine.controls, *OWN, *rig.channels))  # a channel may be called like a parameter
     if others := {place: name for place, name in _bound(rig).items() if name not in known}:
         meant = _meant(rig, machine)
