@@ -110,7 +110,7 @@ class CurrentStep(Part):
     """A current that the controller regulates and steps at once. `parameter`, A, is added to its reference; `along` is the
     channel of a capture that reads that current, `across` the one beside it, which is to stay; `currents` and `voltages` those
     of the half-bridges that carry it, before and behind their filters, of a symmetric winding; `supply` that of the DC link,
-    half of which a half-bridge can give. `still`: positions that such a step must leave where they are.
+    half of which a half-bridge can give. `still`: positions and angles that such a step must leave where they are.
 
     What the controller has of it: parameters `gain` V/A, the proportional one, and `current_limit` A, of `currents`; what the
     machine's table states: `inductance` of the winding and `filter_inductance` of a half-bridge, H."""

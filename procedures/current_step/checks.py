@@ -58,7 +58,7 @@ def _stepped(mine: Sequence[Taken], kind: str, place: str, plan: Plan) -> Iterat
 
 
 def of_pushes(pushed: Sequence[Pushed], plan: Plan) -> Iterator[Finding]:
-    """Positions that a step must leave alone."""
+    """Positions and angles that a step must leave alone."""
     for p in pushed:
         far = {name: m for name, m in p.moved.items() if m > plan.max_push_m}
         if far:
@@ -68,6 +68,14 @@ def of_pushes(pushed: Sequence[Pushed], plan: Plan) -> Iterator[Finding]:
                 "controller takes it to be: a coil is reversed, or exchanged with one of another system."
             )
             yield Finding("mover-pushed", text, p.place, Effect.INDETERMINATE)
+        if turned := {name: rad for name, rad in p.turned.items() if rad > plan.max_turn_rad}:
+            text = (
+                f"the step turned the mover: {', '.join(f'{name} by {rad * 1e3:.3g} mrad' for name, rad in turned.items())} "
+                f"({plan.max_turn_rad * 1e3:.3g} mrad is allowed). This current gives no torque where phases and the angle's "
+                "zero are as the controller takes them to be: two phases are exchanged, or the zero is off. The steps were "
+                "taken at other angles than the mover was left at."
+            )
+            yield Finding("mover-turned", text, p.place, Effect.INDETERMINATE)
 
 
 def of_result(places: Sequence[Place]) -> Iterator[Finding]:

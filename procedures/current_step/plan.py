@@ -25,5 +25,6 @@ class Plan(BenchPlan):
     settle_s: float = Field(1.0, ge=0)  # before all: the mover rocks in its rings when it is taken hold of
     push_s: float = Field(0.06, ge=0.02)  # how long the mover is looked at before the large step, and under it
     max_push_m: float = Field(5e-6, gt=0)  # that a position which such a step must leave alone may move
+    max_turn_rad: float = Field(2e-3, gt=0)  # that an angle which such a step must leave alone may turn
     max_unsettled: float = Field(0.01, gt=0)  # of a step: how far its end may be off its size or still drift
     max_lost: float = Field(1e-3, ge=0)  # share of a step's samples

@@ -41,10 +41,11 @@ class Taken:
 
 @dataclass(frozen=True)
 class Pushed:
-    """Positions under a held step: how much farther each went than it did before, m."""
+    """Positions and angles under a held step: how much farther each went than it did before, m and rad."""
 
     place: str
     moved: Mapping[str, float]
+    turned: Mapping[str, float]
 
 
 def place_of(rig: RigFile, name: str) -> CurrentStep:
@@ -95,20 +96,28 @@ def _read(recording: Recording[Plan], kind: str, step: Step) -> Taken:
 
 
 def read_pushed(recording: Recording[Plan]) -> list[Pushed]:
-    """How far positions moved under each held step, in time order."""
+    """How far positions and angles moved under each held step, in time order."""
     out = []
     for step in recording.steps(PUSH):
         place = place_of(recording.rig, str(step.labels["place"]))
         data, tick_s = _captured(recording, step, place.still)
         count = max(round(WORTH_S / tick_s), 1)
         before = round(recording.plan.push_s / tick_s)
-        out.append(Pushed(str(step.labels["place"]), {name: moved(data[name], count, before) for name in place.still}))
+        angles = {name for name in place.still if angular(recording.rig, name)}
+        far = {n: moved(np.unwrap(data[n]) if n in angles else data[n], count, before) for n in place.still}
+        out.append(Pushed(str(step.labels["place"]), {n: m for n, m in far.items() if n not in angles},
+                          {n: m for n, m in far.items() if n in angles}))  # fmt: skip
     return out
 
 
+def angular(rig: RigFile, channel: str) -> bool:
+    """Whether a channel of captures tells an angle."""
+    return rig.capture is not None and rig.capture.channels[channel].unit == "rad"
+
+
 def moved(x: Array, count: int, before: int) -> float:
-    """How much farther a position (n,) goes from its mean over the samples `before` than it went among those, m: a mover in its
-    rings may rock. By means of `count` samples, so that noise is no motion."""
+    """How much farther a position or an angle (n,) goes from its mean over the samples `before` than it went among those: a
+    mover in its rings may rock. By means of `count` samples, so that noise is no motion."""
     each = x[: len(x) // count * count].reshape(-1, count).mean(axis=1)
     first = each[: max(before // count, 1)]
     away = np.abs(each - first.mean())

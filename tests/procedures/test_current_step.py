@@ -146,8 +146,10 @@ def test_a_mover_that_rocks_is_not_pushed() -> None:
     rocking = 5e-6 * np.sin(2 * np.pi * 70 * t)
     assert moved(rocking, 18, 2100) < 0.2e-6
     assert moved(rocking + np.where(t > 0.07, 20e-6, 0), 18, 2100) == pytest.approx(20e-6, abs=0.4e-6)
-    (found,) = checks.of_pushes([Pushed("R1_d", {"x1": 20e-6, "y1": 1e-6})], Plan())
+    (found,) = checks.of_pushes([Pushed("R1_d", {"x1": 20e-6, "y1": 1e-6}, {"gamma": 5e-4})], Plan())
     assert (found.code, "x1 by 20 µm" in found.text, "y1" in found.text) == ("mover-pushed", True, False)
+    (found,) = checks.of_pushes([Pushed("R1_d", {"x1": 1e-6}, {"gamma": 0.17})], Plan())
+    assert (found.code, "gamma by 170 mrad" in found.text, "x1" in found.text) == ("mover-turned", True, False)
 
 
 @pytest.mark.parametrize(
@@ -200,6 +202,8 @@ def test_the_truth_is_recovered(tmp_path: Path) -> None:
     ("truth", "plan", "code"),
     [
         ({"coil_reversed": 2}, {}, "mover-pushed"),
+        ({"exchange_phases": 1}, {}, "mover-turned"),
+        ({"zero_off_ra": 0.4}, {}, "mover-turned"),
         ({"factor_current_max": 0.3}, {}, "limit-untouched"),
         ({}, {"size_A": 0.4}, "limit-untouched"),
         ({}, {"steps_at": ["L_d"], "hold_s": 0.03}, "small-step-limited"),
