@@ -72,7 +72,7 @@ def compared(procedure: str, tree: Path, seed: int) -> Compared:
     common = ["--rig", told["rig"], "--calibrations", str(folder)]
     for name, plan in told.get("chain", {}).items():
         golden.bench(tree, ["adopt", str(golden.ran(tree, name, plan, seed, common)), *common])
-    run = golden.ran(tree, procedure, told["plan"], seed, common)
+    run = golden.ran(tree, procedure, told.get("plan", ()), seed, common)
     refused = list(not_taken(told["rig"], folder, seed))
     words = [sys.executable, "-m", "bench.cli", "analyse", str(run)]
     done = subprocess.run(words, cwd=golden.ROOT, text=True, capture_output=True)

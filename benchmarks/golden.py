@@ -101,7 +101,7 @@ def beside(procedure: str, seed: int, old: Path, new: Path) -> list[str]:
     common = ["--rig", told["rig"], "--calibrations", str(old / "runs" / procedure / "calibrations")]
     for name, plan in told.get("chain", {}).items():
         bench(old, ["adopt", str(ran(old, name, plan, seed, common)), *common])
-    before, after = (ran(tree, procedure, told["plan"], seed, common) for tree in (old, new))
+    before, after = (ran(tree, procedure, told.get("plan", ()), seed, common) for tree in (old, new))
     lines = [*differences(record(before), record(after)), *differences(messages(before), messages(after))]
     bench(new, ["analyse", str(before)])
     again = next((before / "analyses").iterdir())

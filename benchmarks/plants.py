@@ -95,7 +95,9 @@ def bed_of(name: str) -> Bed:
         for p in found["plant"]
     )  # fmt: skip
     units = {p["name"]: "" if p["unit"] == "1" else f" {p['unit']}" for p in found["plant"]}
-    return Bed(found.get("procedure", name), found["rig"], tuple(found["plan"]), found.get("chain", {}), plants, units)
+    return Bed(
+        found.get("procedure", name), found["rig"], tuple(found.get("plan", ())), found.get("chain", {}), plants, units
+    )
 
 
 def fly(bed: Bed, procedure: str, plan: Sequence[str], seed: int, truth: Mapping[str, float],
