@@ -72,6 +72,22 @@ def test_a_controller_with_a_rate_of_its_own_is_told_by_the_sizes(tmp_path: Path
     assert "bind it as set_points.slew" in text
 
 
+@pytest.mark.parametrize(("rate", "found"), [(0.0, False), (0.5, True)])
+def test_a_law_that_differentiates_its_error(tmp_path: Path, rate: float, found: bool) -> None:
+    """At 0.5 m/s a step is there within a tick, and the derivative pushes as it goes: the start is then found 0.1 to 0.2 ms
+    early, and settling times were 2.8 U too long in silence."""
+    truth = {"own_slew": rate} if rate else {}
+    run = simulated_run("step", SPINDLE, 0, {"axes": ["y"], "settle_s": 1.0}, tmp_path / "spindle.mcap", truth)
+    assert wrong(run) == []
+    assert ("start-unclear" in {f.code for f in run.results if isinstance(f, Finding)}) is found
+    true = truth_of_motion(run)
+    times = [m for m in run.results if isinstance(m, Measured) and m.quantity.name == "settling_time"]
+    assert len(times) == 4
+    for m in times:
+        assert abs(m.estimate.value - true[f"settling_time@{m.where}"]) < 1.1 * interval(m.estimate).U
+        assert (interval(m.estimate).U > 2e-4) is found
+
+
 def _two_writes_apart_are_told(recording: Recording[Plan]) -> None:
     """The step rises in 2.6 ms: 0.2 ms between the set points of its bearings are told, 0.1 ms are not."""
     steps = read_steps(recording)

@@ -23,6 +23,34 @@ def pushing(machine: AmbRotor, direction: str, axis: str, by_channel: Mapping[st
     return (by_channel[p] - by_channel[n]) * math.copysign(1.0, machine.stations.share(direction, axis))
 
 
+def _window(tick: float, ticks: int, period_s: float) -> float:
+    return ONSET * max(ticks * tick, period_s)
+
+
+def _answers(later: Array, lag_s: float, window: float, powers: tuple[int, ...]) -> Array:
+    """What a current is made of, (n, 2 + powers), at times `later` (n, ticks) than the amplifiers were told: each averaged."""
+    since = np.maximum(later, 0.0)
+    answer = (1 - np.exp(-since / lag_s)).mean(axis=1)
+    return np.column_stack([np.ones(len(since)), answer, *((since**k).mean(axis=1) / window**k for k in powers)])
+
+
+def unlike(
+    t: Array, current: Array, began: float, *, tick: float, ticks: int, lag_s: float, window_s: float | None = None
+) -> float:
+    """How unlike an answer is to that of a set point which jumped at `began` as `onset` found it, by the same curve: the rms of
+    what it leaves over the window, without the noise of the readings before, over the jump."""
+    window = _window(tick, ticks, 0.0) if window_s is None else window_s
+    near = (t > began - BEFORE_S) & (t < began + LATE_S + window)
+    later = t[near, None] - tick * np.arange(1, ticks + 1) - (began + LATE_S + DELAY_TICKS * tick)
+    design = _answers(later, lag_s, window, (2,))
+    terms, *_ = np.linalg.lstsq(design, current[near], rcond=None)
+    left, after = current[near] - design @ terms, (later > 0).any(axis=1)
+    if after.sum() < 2 or (~after).sum() < 2 or terms[1] == 0:
+        return 0.0
+    more = float((left[after] ** 2).mean() - left[~after].var(ddof=1))
+    return math.sqrt(max(more, 0.0)) / abs(float(terms[1]))
+
+
 def onset(
     t: Array,
     current: Array,
@@ -46,17 +74,14 @@ def onset(
     time since, for a rate that a fast loop turns round within the window; and the noise is that of the jump which they make
     together, as if all that is left of one answer were alike.
     """
-    window = ONSET * max(ticks * tick, period_s) if window_s is None else window_s
+    window = _window(tick, ticks, period_s) if window_s is None else window_s
     reads = t[:, None] - tick * np.arange(1, ticks + 1)
     near = (t > earliest - BEFORE_S) & (t < latest + window)
     many = answers > 1
 
     def fitted(t_0: float) -> tuple[float, float, float, float]:
         use = near & (t < t_0 + window)
-        since = np.maximum(reads[use] - t_0 - DELAY_TICKS * tick, 0.0)
-        answer = (1 - np.exp(-since / lag_s)).mean(axis=1)
-        powers = [(since**k).mean(axis=1) / window**k for k in ((1, 2) if many else (2,))]
-        design = np.column_stack([np.ones(use.sum()), answer, *powers])
+        design = _answers(reads[use] - t_0 - DELAY_TICKS * tick, lag_s, window, (1, 2) if many else (2,))
         terms, *_ = np.linalg.lstsq(design, current[use], rcond=None)
         share = math.sqrt(np.linalg.pinv(design.T @ design)[1, 1] * use.sum() / answers) if many else 1.0
         return float(((current[use] - design @ terms) ** 2).mean()), t_0, float(terms[1]), share

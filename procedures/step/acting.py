@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 
 from bench.recording import Step
 from bench.rigfile import RigFile
 from procedures.amb_rotor.conventions import conventions
-from procedures.amb_rotor.onset import onset
+from procedures.amb_rotor.onset import onset, unlike
 from procedures.step import capturing
 
 Array = npt.NDArray[np.float64]
@@ -16,6 +18,15 @@ GONE = 0.25  # of the way: until then the currents push
 ANSWER = 0.25  # of the greatest change of the control current: where it first gets there, the step began
 SURELY_S, PLAIN, FEWEST = 5e-3, 8.0, 25  # before a quarter of the way; standard deviations; samples that tell them
 WINDOW_S = 1.5e-3  # of single readings, from the start on: the shaft has hardly moved
+
+
+class Acted(NamedTuple):
+    """When a set point acted, s; how unlike to that of a jump the currents' answer is, over the jump; within what of that
+    instant it surely was, s."""
+
+    began: float
+    unlike: float
+    within: tuple[float, float]
 
 
 def still_at(t_ns: npt.NDArray[np.int64], position: Array, written_ns: int) -> npt.NDArray[np.bool_]:
@@ -61,7 +72,7 @@ def answer(control: Array, rest: npt.NDArray[np.bool_], until: int) -> tuple[int
     return begin + int(np.argmax(window > max(ANSWER * window.max(), 4 * noise))), True
 
 
-def acted(rig: RigFile, step: Step, t: Array, control: Array, first: int, *, origin_ns: int, turning: bool) -> float:
+def acted(rig: RigFile, step: Step, t: Array, control: Array, first: int, *, origin_ns: int, turning: bool) -> Acted:
     """When the set point changed, s on the time `t` (n,) of samples that counts from `origin_ns`: finer than their period, by
     the control currents (n,); by their single readings where the step was captured and nothing turns."""
     machine, tick = conventions(rig), rig.devices["controller"].tick_s
@@ -72,7 +83,10 @@ def acted(rig: RigFile, step: Step, t: Array, control: Array, first: int, *, ori
         if turning
         else capturing.read_control(step, [machine.pair(a) for a in machine.along(str(step.labels["axis"]))])
     )
-    if single is None:
-        return onset(t, control, earliest, latest, tick=tick, ticks=round(period / tick), lag_s=machine.lag_s)[0]
-    at: Array = np.asarray((single[0] - origin_ns) * 1e-9 + tick, np.float64)
-    return onset(at, single[1], earliest, latest, tick=tick, ticks=1, lag_s=machine.lag_s, window_s=WINDOW_S)[0]
+    ticks, window_s = round(period / tick), None
+    if single is not None:
+        t, control = np.asarray((single[0] - origin_ns) * 1e-9 + tick, np.float64), single[1]
+        ticks, window_s = 1, WINDOW_S
+    began, _ = onset(t, control, earliest, latest, tick=tick, ticks=ticks, lag_s=machine.lag_s, window_s=window_s)
+    share = unlike(t, control, began, tick=tick, ticks=ticks, lag_s=machine.lag_s, window_s=window_s)
+    return Acted(began, share, (earliest - began, latest - began))

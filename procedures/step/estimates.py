@@ -23,6 +23,7 @@ from procedures.step.oscillation import One, Swing
 from procedures.step.position import leans, shares, tilting_of
 from procedures.step.scatter import jackknifed, left_out, pooled, repeated, weighed
 from procedures.step.settling import Curve, Settling
+from procedures.step.starts import START_S
 from procedures.step.steps import Case, Done
 
 Array = npt.NDArray[np.float64]
@@ -35,9 +36,6 @@ ALIAS, FOLDED = 3e-3, 0.1
 # Of the directions' difference of overshoot, times the square of what half a swing leaves of the swing: the second harmonic at
 # the top, which oscillations leave out. Without noise 0.07 to 0.45 (`harmonic_left`).
 HARMONIC = 0.45
-# How well the control currents tell when the set points of a case acted: the mean of its steps, on 12 drawn machines of three
-# rigs, 38 µs early to 29 µs late (noise, and what `onset.LATE_S` leaves of the rotor's answer).
-START_S = 4e-5
 # Second-order effect of a step's size over the square of its first-order effect: damping either way; frequency from none to
 # less by this much, since what bearings have of quadratic and cubic forces softens them (Landau, Mechanics, section 28).
 SIZE_DAMPING, SIZE_FREQUENCY = (-2.0, 2.0), (-4.0, 0.0)
@@ -78,7 +76,7 @@ def by_case(steps: list[Done], rig: RigFile, band: float) -> dict[Case, Result]:
         settled = settling.settling(curves[case.group], case, all_of, band)
         found = {name: pooled(name, case, s) for name, s in seen.items() if case in s.values}
         if math.isfinite(settled.time) and not leans(rig, case.axis):
-            found["settling_time"] = settling_estimate(case, settled)
+            found["settling_time"] = settling_estimate(case, settled, all_of[0].late_s, all_of[0].start_s)
             if (lag := lag_estimate(rig)) is not None:
                 found["settling_time"] += lag
         period = float(all_of[0].t[1] - all_of[0].t[0])
@@ -150,8 +148,9 @@ def _curve(done: Sequence[Done], tilting: Tilting) -> Curve:
     return settling.fit(done, found.poles, found.pole, found.constant)
 
 
-def settling_estimate(case: Case, settled: Settling) -> Estimate:
-    """The expected time with all that are possible: a distribution of its own (JCGM 101, 6.5)."""
+def settling_estimate(case: Case, settled: Settling, late: float = 0.0, start: float = START_S) -> Estimate:
+    """The expected time with all that are possible: a distribution of its own (JCGM 101, 6.5); from `late` s on, give or take
+    `start`, when the set point acted."""
     from scipy.special import ndtr
 
     noise = Influence(
@@ -170,7 +169,7 @@ def settling_estimate(case: Case, settled: Settling) -> Estimate:
         return times
 
     made = Estimate(settled.time, "s", {noise: 1.0}, sampled if noise.u else None)
-    return made + bound(f"start/{case.where}", "start of the step", START_S, "s")
+    return made + bound(f"start/{case.where}", "start of the step", start, "s") - late
 
 
 def lag_estimate(rig: RigFile) -> Estimate | None:
@@ -183,13 +182,13 @@ def lag_estimate(rig: RigFile) -> Estimate | None:
 def by_group(steps: list[Done], results: Mapping[Case, Result], rig: RigFile) -> dict[str, dict[str, Estimate]]:
     """Of each setting, axis and speed: the oscillation, and how far size and direction matter."""
     out: dict[str, dict[str, Estimate]] = {}
-    for group in step_steps.by_group(steps):
+    for group, done in step_steps.by_group(steps).items():
         of = [r for c, r in results.items() if c.group == group]
-        out[group] = _oscillation(group, of, rig) | _linearity(of)
+        out[group] = _oscillation(group, of, rig, done[0].start_s) | _linearity(of)
     return out
 
 
-def _oscillation(group: str, results: Sequence[Result], rig: RigFile) -> dict[str, Estimate]:
+def _oscillation(group: str, results: Sequence[Result], rig: RigFile, start: float) -> dict[str, Estimate]:
     """Damping and natural frequency from all steps together, those of large ones weighing more; uncertainty by leaving out
     one step after the other, among those of its kind. Nothing where there is no oscillation.
 
@@ -224,7 +223,7 @@ def _oscillation(group: str, results: Sequence[Result], rig: RigFile) -> dict[st
             dof=weighed(kinds),
             source=f"{n} steps, left out in turn",
         )
-        moved = max(abs(of(whole.later(by)) - value) for by in (START_S, -START_S))
+        moved = max(abs(of(whole.later(by)) - value) for by in (start, -start))
         out[name] = Estimate.of(value * (1 - (low + high) / 2 * first**2), jackknife)
         out[name] += bound(f"start/{name}/{group}", "start of the step", moved, unit)
         out[name] += bound(f"size/{name}/{group}", "size of the steps", (high - low) / 2 * first**2 * value, unit)

@@ -187,6 +187,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     findings.add(frame.describe(recording.rig, plan.axes))
     findings.add(checks.of_results(by_case, by_group, plan, leaning=leans(recording.rig)))
     findings.add(slewing.of_sizes(by_case))
+    findings.add(slewing.of_starts(steps))
     findings.add(hum.find_hum(steps, by_case))
     findings.add(checks.compare(by_case, plan.names))
     return Results(steps, by_case, by_group)

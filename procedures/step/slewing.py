@@ -13,7 +13,8 @@ from collections.abc import Iterator, Mapping
 from bench.findings import Effect, Finding
 from bench.uncertainty import interval
 from procedures.step.estimates import Result
-from procedures.step.steps import Case
+from procedures.step.starts import UNLIKE, unlike
+from procedures.step.steps import Case, Done, by_group
 
 WIDER = 0.6
 SURE = 1.5  # times the expanded uncertainty of the difference
@@ -40,3 +41,14 @@ def of_sizes(results: Mapping[Case, Result]) -> Iterator[Finding]:
                 "no steps. If it has a rate, bind it as set_points.slew, or set it to none.")  # fmt: skip
         places = (case.where for case in results if case.group == group)
         yield Finding("set-points-slewed", text, group, Effect.INDETERMINATE, (f"@{group}", *(f"@{p}" for p in places)))
+
+
+def of_starts(steps: list[Done]) -> Iterator[Finding]:
+    """Groups in which the currents do not answer as to a jump, so that its instant is known less well."""
+    for group, of in by_group(steps).items():
+        share = unlike(of)
+        if share > UNLIKE:
+            text = (f"the control currents answer the set point otherwise than a jump, by {share:.0%} of it: the law pushes as "
+                    "the set point goes, as one does that differentiates its error. When a step begins is known to "
+                    f"±{of[0].start_s * 1e3:.2g} ms, and so are settling times.")  # fmt: skip
+            yield Finding("start-unclear", text, group)

@@ -22,6 +22,7 @@ from procedures.step import acting, capturing
 from procedures.step.position import ends_of, made_of, shares
 from procedures.step.requires import channels
 from procedures.step.response import trailing
+from procedures.step.starts import START_S, told
 
 Array = npt.NDArray[np.float64]
 STEP = "set-point"
@@ -60,7 +61,8 @@ class Done:
     `y`, `tilt`, `across` m along the way of the step: from where they rested, what turns with the shaft taken away; `raw` as
     `y` with it; `rest` m the same before the step; `control` A, difference of the coils, both bearings; `answered`: it did;
     `kicks` A, of each bearing's at first. `noise` m of the mean over `samples`. The `machine`.
-    `apart` s from the first to the last write of the step's set points."""
+    `apart` s from the first to the last write of the step's set points; how `unlike` to that of a jump the answer is;
+    `within` what of `t` the set points surely acted, s; they did `late_s` after t = 0, give or take `start_s`."""
 
     case: Case
     begin: float
@@ -84,6 +86,10 @@ class Done:
     expected: int
     machine: AmbRotor
     apart: float = 0.0
+    unlike: float = 0.0
+    within: tuple[float, float] = (0.0, 0.0)
+    late_s: float = 0.0
+    start_s: float = START_S
 
 
 def read_steps(recording: Recording[Any]) -> list[Done]:
@@ -95,7 +101,8 @@ def read_steps(recording: Recording[Any]) -> list[Done]:
     out = [_read(recording, step) for step in recording.steps(STEP)]
     if not out:
         raise AnalysisError("found no set-point steps; expected those of the plan (was the run stopped early?)")
-    return out
+    groups = {group: iter(told(of)) for group, of in by_group(out).items()}
+    return [next(groups[done.case.group]) for done in out]
 
 
 def by_case(steps: list[Done]) -> dict[Case, list[Done]]:
@@ -166,8 +173,8 @@ def _done(
     first, answered = acting.answer(clean[4:], rest, acting.before_it_moves(clean[0], rest))
     period = float(np.median(np.diff(t)))
     samples = 2 * math.pi / float(np.median(data[SPEED])) / period if turning else AT_REST_S / period
-    began = acting.acted(rig, step, t, clean[3], first, origin_ns=int(data["t_ns"][0]), turning=turning)
-    since = t - began - EARLY_TICKS * rig.devices["controller"].tick_s
+    acted = acting.acted(rig, step, t, clean[3], first, origin_ns=int(data["t_ns"][0]), turning=turning)
+    since = t - acted.began - EARLY_TICKS * rig.devices["controller"].tick_s
     keep = slice(max(first - 20, 0), None)
     quiet = clean[0][rest]
     slope = float(np.polyfit(t[rest], quiet, 1)[0])
@@ -180,7 +187,7 @@ def _done(
         acting.kicks(clean[4:], case.way * np.array(ends), rest, first),
         (float(data[SPEED].min()), float(data[SPEED].max())), int(np.bitwise_or.reduce(flags)),
         tuple(c for c in (*machine.all_positions, *machine.all_currents) if np.ptp(data[c]) == 0), step.lost(), step.expected(),
-        machine,
+        machine, unlike=acted.unlike, within=acted.within,
     )  # fmt: skip
 
 
