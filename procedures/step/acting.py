@@ -1,4 +1,6 @@
-"""When the set point of a step acted, by the coil currents that answer it; which of them push, and which way."""
+"""When the set point of a step acted, by the coil currents that answer it; which of them push, and which way. A law that
+differentiates its error pushes as the set point goes, and its currents answer otherwise than a jump's: `onset` then finds them
+early, by about the currents' lag."""
 
 from __future__ import annotations
 
@@ -14,6 +16,11 @@ from procedures.amb_rotor.onset import onset, unlike
 from procedures.step import capturing
 
 Array = npt.NDArray[np.float64]
+START_S = 4e-5
+"""How well the control currents tell when the set points of a case acted: the mean of its steps, on 12 drawn machines of three
+rigs, 38 µs early to 29 µs late (noise, and what `onset.LATE_S` leaves of the rotor's answer)."""
+UNLIKE = 0.03
+"""Of the jump: on drawn machines of three rigs 0.005 at most; 0.05 to 0.25 where the derivative pushes."""
 GONE = 0.25  # of the way: until then the currents push
 ANSWER = 0.25  # of the greatest change of the control current: where it first gets there, the step began
 SURELY_S, PLAIN, FEWEST = 5e-3, 8.0, 25  # before a quarter of the way; standard deviations; samples that tell them

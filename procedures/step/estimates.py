@@ -17,13 +17,13 @@ from procedures.amb_rotor import loops
 from procedures.shared.certificates import certified
 from procedures.step import response, settling
 from procedures.step import steps as step_steps
+from procedures.step.acting import START_S
 from procedures.step.coupled import Tilting
 from procedures.step.fit import swing
 from procedures.step.oscillation import One, Swing
 from procedures.step.position import leans, shares, tilting_of
 from procedures.step.scatter import jackknifed, left_out, pooled, repeated, weighed
 from procedures.step.settling import Curve, Settling
-from procedures.step.starts import START_S
 from procedures.step.steps import Case, Done
 
 Array = npt.NDArray[np.float64]

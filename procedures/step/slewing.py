@@ -12,9 +12,9 @@ from collections.abc import Iterator, Mapping
 
 from bench.findings import Effect, Finding
 from bench.uncertainty import interval
+from procedures.step.acting import UNLIKE
 from procedures.step.estimates import Result
-from procedures.step.starts import UNLIKE, unlike
-from procedures.step.steps import Case, Done, by_group
+from procedures.step.steps import Case, Done, by_group, unlike
 
 WIDER = 0.6
 SURE = 1.5  # times the expanded uncertainty of the difference

@@ -4,7 +4,7 @@ turns with it."""
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,10 +19,10 @@ from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.machine import AmbRotor
 from procedures.amb_rotor.onset import pushing
 from procedures.step import acting, capturing
+from procedures.step.acting import START_S, UNLIKE
 from procedures.step.position import ends_of, made_of, shares
 from procedures.step.requires import channels
 from procedures.step.response import trailing
-from procedures.step.starts import START_S, told
 
 Array = npt.NDArray[np.float64]
 STEP = "set-point"
@@ -119,6 +119,21 @@ def by_group(steps: list[Done]) -> dict[str, list[Done]]:
     for done in steps:
         out.setdefault(done.case.group, []).append(done)
     return out
+
+
+def unlike(steps: Sequence[Done]) -> float:
+    """How unlike to that of a jump the currents' answer is: of the size of step that shows it most, over the jump."""
+    return max(
+        float(np.mean([d.unlike for d in steps if d.case.size == size])) for size in {d.case.size for d in steps}
+    )
+
+
+def told(steps: Sequence[Done]) -> list[Done]:
+    """Steps of one group with how well their start is known: as the currents tell it, or by what is sure of each of them."""
+    if unlike(steps) <= UNLIKE:
+        return list(steps)
+    low, high = max(d.within[0] for d in steps), min(d.within[1] for d in steps)
+    return [replace(d, late_s=(low + high) / 2, start_s=max((high - low) / 2, 0.0) + START_S) for d in steps]
 
 
 def _read(recording: Recording[Any], step: Step) -> Done:

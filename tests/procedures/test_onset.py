@@ -32,13 +32,12 @@ def test_a_push_is_found_early_and_unlike_a_jump(
 ) -> None:
     """A derivative that is 0.3 ms of the gain: early by half of the lag and more; a jump is where it is, within 0.2 of it."""
     rng = np.random.default_rng(3)
-    known = {"tick": TICK, "ticks": TICKS, "lag_s": LAG}
     found, share = [], []
     for _ in range(20):
         t, current = answer(push_s, 0.008, rng)
-        began, _ = onset(t, current, BEGAN - 3e-4, BEGAN + 4e-4, **known)
+        began, _ = onset(t, current, BEGAN - 3e-4, BEGAN + 4e-4, tick=TICK, ticks=TICKS, lag_s=LAG)
         found.append((BEGAN - began) / LAG)
-        share.append(unlike(t, current, began, **known))
+        share.append(unlike(t, current, began, tick=TICK, ticks=TICKS, lag_s=LAG))
     assert early[0] < np.mean(found) < early[1]
     assert apart[0] <= np.mean(share) < apart[1]
 
