@@ -129,11 +129,14 @@ def unlike(steps: Sequence[Done]) -> float:
 
 
 def told(steps: Sequence[Done]) -> list[Done]:
-    """Steps of one group with how well their start is known: as the currents tell it, or by what is sure of each of them."""
+    """Steps of one group with how well their start is known: as the currents tell it, or by what is sure of those of a case in
+    the mean."""
     if unlike(steps) <= UNLIKE:
         return list(steps)
-    low, high = max(d.within[0] for d in steps), min(d.within[1] for d in steps)
-    return [replace(d, late_s=(low + high) / 2, start_s=max((high - low) / 2, 0.0) + START_S) for d in steps]
+    sure = {d.case: np.mean([e.within for e in steps if e.case == d.case], axis=0) for d in steps}
+    return [
+        replace(d, late_s=float(sure[d.case].mean()), start_s=float(np.ptp(sure[d.case])) / 2 + START_S) for d in steps
+    ]
 
 
 def _read(recording: Recording[Any], step: Step) -> Done:
