@@ -2,14 +2,14 @@
 
 The record is cut into periods of the injection. Its lines lie on the bins of a period, so that no window is needed and
 nothing of one line is in another. What turns with the shaft is not periodic with it: it is taken out first. Each period gives
-one value per line; their scatter about the response is its covariance.
+one value per line; their scatter about the response is its covariance. Of a line that stands alone the bins beside it tell.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -137,6 +137,27 @@ def response(found: Lines, of: int, to: int, estimator: Literal["H1", "H2", "rat
     covariance = np.einsum("pmi,pmj->mij", moved, moved) * p / (p - 1)
     coherence = np.abs(yx) ** 2 / np.maximum(xx * yy, 1e-300)
     return Response(found.hz, h, covariance, coherence, float(p - 1))
+
+
+def single_response(x: npt.ArrayLike, rate: float, period: int, hz: float, of: int, to: int) -> Response:
+    """The response of channel `of` to channel `to` of `x` (c, n) where all periods have one line, at `hz`; H1.
+
+    Covariance by the bins of the whole record to either side, as far as where a harmonic may stand, one period's bin away: what
+    is periodic is in none of them. Each is a degree of freedom, 2 (p - 1) of p periods. The scatter of the periods says too
+    much where noise falls with the frequency: what leaks from below into one is taken back by the next.
+
+    Raises:
+        AnalysisError: as `lines` and `response`.
+    """
+    data = rows(x)
+    r = response(lines(data, rate, period, hz), of, to)
+    count = data.shape[1] // period
+    found = np.fft.rfft(data[:, : count * period], axis=1)
+    at = round(hz * period / rate) * count
+    beside = np.r_[at - count + 1 : at, at + 1 : min(at + count, (count * period + 1) // 2)]
+    noise = found[of, beside] - r.values * found[to, beside]
+    power = float((np.abs(noise) ** 2).mean() / np.abs(found[to, at]) ** 2)
+    return replace(r, covariance=power / 2 * np.eye(2)[None], dof=float(beside.size))
 
 
 def complementary(sensitivity: Response) -> Response:
