@@ -142,9 +142,9 @@ def response(found: Lines, of: int, to: int, estimator: Literal["H1", "H2", "rat
 def single_response(x: npt.ArrayLike, rate: float, period: int, hz: float, of: int, to: int) -> Response:
     """The response of channel `of` to channel `to` of `x` (c, n) where all periods have one line, at `hz`; H1.
 
-    Covariance by the bins of the whole record to either side, as far as where a harmonic may stand, one period's bin away: what
-    is periodic is in none of them. Each is a degree of freedom, 2 (p - 1) of p periods. The scatter of the periods says too
-    much where noise falls with the frequency: what leaks from below into one is taken back by the next.
+    Covariance by the bins of the whole record to either side, half as far as where a harmonic may stand, one period's bin
+    away: what is periodic is in none of them. Each is a degree of freedom, p or p - 1 of p periods. The scatter of the periods
+    says twice too much where noise is far greater at other frequencies: what leaks from there into one, the next takes back.
 
     Raises:
         AnalysisError: as `lines` and `response`.
@@ -154,7 +154,7 @@ def single_response(x: npt.ArrayLike, rate: float, period: int, hz: float, of: i
     count = data.shape[1] // period
     found = np.fft.rfft(data[:, : count * period], axis=1)
     at = round(hz * period / rate) * count
-    beside = np.r_[at - count + 1 : at, at + 1 : min(at + count, (count * period + 1) // 2)]
+    beside = np.r_[at - count // 2 : at, at + 1 : min(at + count // 2, (count * period - 1) // 2) + 1]
     noise = found[of, beside] - r.values * found[to, beside]
     power = float((np.abs(noise) ** 2).mean() / np.abs(found[to, at]) ** 2)
     return replace(r, covariance=power / 2 * np.eye(2)[None], dof=float(beside.size))

@@ -15,6 +15,7 @@ from bench.analysis.responses import (
     lines,
     loop,
     response,
+    single_response,
     without_orders,
 )
 from bench.errors import AnalysisError
@@ -100,6 +101,32 @@ def test_the_variance_holds_what_scatters() -> None:
         seen.append(found.values)
         told.append(np.trace(found.covariance, axis1=1, axis2=2))
     assert np.mean(np.var(seen, axis=0)) == pytest.approx(np.mean(told), rel=0.08)
+
+
+@pytest.mark.parametrize(("power", "too_much"), [(0.0, 1.0), (1.0, 2.1)])
+def test_bins_beside_a_single_line_tell_its_noise_also_where_it_grows_with_the_frequency(
+    power: float, too_much: float
+) -> None:
+    """300 records of four periods, a line of one cycle in each, under white noise and under noise whose amplitudes grow as the
+    frequency: their scatter then says twice too much. By hand: two bins to either side of four periods."""
+    count, period, seen, told, scatter = 1000, 250, [], [], []
+    t = np.arange(count) / period
+    x = np.cos(2 * np.pi * t)
+    shape = np.arange(4 * count + 1.0) ** power / (4 * count) ** power
+    for seed in range(300):
+        drawn = np.fft.rfft(np.random.default_rng([3, seed]).normal(size=8 * count))
+        noise = np.fft.irfft(shape * drawn)[:count]  # a record is a piece of what goes on
+        data = np.array([x, 0.5 * np.sin(2 * np.pi * t) + noise])
+        found = single_response(data, float(period), period, 1.0, 1, 0)
+        whole = response(lines(data, float(period), period, [1.0]), 1, 0)
+        assert (found.values, found.dof) == (whole.values, 4.0)
+        seen.append(found.values[0])
+        told.append(np.trace(found.covariance[0]))
+        scatter.append(np.trace(whole.covariance[0]))
+    off = np.std(seen)
+    assert abs(np.mean(seen) + 0.5j) < 3.3 * off / np.sqrt(300)
+    assert np.sqrt(np.mean(told)) / off == pytest.approx(1.0, abs=0.1)
+    assert np.sqrt(np.mean(scatter)) / off == pytest.approx(too_much, abs=0.15)
 
 
 def test_intervals_of_the_peak_hold_it_and_the_raw_maximum_does_not() -> None:
