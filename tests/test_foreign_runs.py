@@ -88,6 +88,25 @@ def test_a_law_that_differentiates_its_error(tmp_path: Path, rate: float, found:
         assert (interval(m.estimate).U > 2e-4) is found
 
 
+@pytest.mark.parametrize(
+    ("softer", "told_of"),
+    [(0.7, True), pytest.param(0.85, True, marks=pytest.mark.long), (0.6, False)],
+)
+def test_a_bearing_that_holds_more_softly(tmp_path: Path, softer: float, told_of: bool) -> None:
+    """The lower bearing's proportional gain: at 0.7 and 0.6 of it the mean pole was told 5.5 and 42 Hz off in silence, where
+    what both integrators leave was taken to fade alike. At 0.6 one of the poles has a damping of 0.99."""
+    run = simulated_run(
+        "step", SPINDLE, 1, {"axes": ["y"], "settle_s": 1}, tmp_path / "s.mcap", {"factor_KpLower": softer}
+    )
+    assert wrong(run) == []
+    assert ("oscillations-unlike" in {f.code for f in run.results if isinstance(f, Finding)}) is not told_of
+    seen = [m for m in run.results if isinstance(m, Measured) and m.quantity.name in ("damping", "natural_frequency")]
+    assert len(seen) == (2 if told_of else 0)
+    truth = truth_of_motion(run)
+    for m in seen:
+        assert abs(m.estimate.value - truth[f"{m.quantity.name}@{m.where}"]) < 1.5 * interval(m.estimate).U
+
+
 def _two_writes_apart_are_told(recording: Recording[Plan]) -> None:
     """The step rises in 2.6 ms: 0.2 ms between the set points of its bearings are told, 0.1 ms are not."""
     steps = read_steps(recording)

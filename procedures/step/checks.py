@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -207,9 +207,15 @@ def _came(steps: Sequence[Done]) -> Iterator[Finding]:
 
 
 def of_results(
-    results: Mapping[Case, Result], groups: Mapping[str, Mapping[str, Estimate]], plan: Plan, *, leaning: bool = False
+    results: Mapping[Case, Result],
+    groups: Mapping[str, Mapping[str, Estimate]],
+    plan: Plan,
+    *,
+    leaning: bool = False,
+    torn: Container[str] = (),
 ) -> Iterator[Finding]:
-    """Steps that do not settle, bands that noise has widened, responses without an oscillation."""
+    """Steps that do not settle, bands that noise has widened, responses without an oscillation; `torn`: groups of steps in
+    which one of two hardly swings."""
     for case, result in results.items():
         if result.settled.open:
             yield Finding("not-settled", f"the position runs along the edge of the band ({result.settled.within:.1%}), so that "
@@ -233,6 +239,12 @@ def of_results(
                 "bandwidth, damping and frequency are not told; rise and error are."
             )
             yield Finding("axes-oblique", text, where)
+        elif where in torn:
+            text = (
+                "two oscillations share the response, and one of them is damped so heavily that it hardly swings, as where one "
+                "bearing holds the shaft much more softly: damping and frequency of their mean are not told."
+            )
+            yield Finding("oscillations-unlike", text, where)
         elif "damping" not in estimates:
             yield Finding("no-oscillation", "no oscillation that dies away fits the response: damping and frequency are not "
                           "told.", where)  # fmt: skip

@@ -15,9 +15,10 @@ p + d/2 +- s, s² = d²/4 + r e², and the position's parts, with h/s for d/(2 s
 The mean pole is y'(0)/y(0) = p + r e D/C. What the tilt does not show cannot be in the position: where the shaft does not tilt
 there is one oscillation. The integrators leave two things that fade, alike but for a few percent of their constant: in the
 position they add up to one, in the tilt they nearly cancel, as t e^(-t/constant); a tilt without it had the second pole
-anywhere (-216 + 141i for -380 + 562i 1/s), and the damping 0.006 off. Of d and r is known what shafts are like; it counts as
-readings of them (ridge regression), as far as the data do not say otherwise, and how far the result hangs on each is kept
-with it (`Swing.doubts`).
+anywhere (-216 + 141i for -380 + 562i 1/s), and the damping 0.006 off. Where they are less alike, as with bearings whose gains
+differ, the next term of both is seen, t² e^(-t/constant) (`ASKED`): without it the mean pole of such a spindle was 2.8 to 6.4
+of 76 Hz off. Of d and r is known what shafts are like; it counts as readings of them (ridge regression), as far as the data do
+not say otherwise, and how far the result hangs on each is kept with it (`Swing.doubts`).
 """
 
 from __future__ import annotations
@@ -38,6 +39,10 @@ ALIKE = 0.3
 WEIGHS = math.log(2.0)  # of the logarithm of r where nothing is stated: from half to twice for two shafts of three
 DAMPED = 0.2  # where a search begins that has nothing better
 KNOWN = 3  # rows of what is known: both parts of d, and r
+ASKED = 16.0  # of chi-squared, that two terms in t² of what fades have to explain: noise alone does once in 3000
+# Damping from which it is open whether a pole counts as an oscillation (`oscillation.HARD`), and by how much of itself the mean
+# pole may be moved by a second one where that is so.
+NEARLY, TORN = 0.9, 0.05
 TOLD = 1e-6  # of a sum of squares and of what is searched, at which a search ends
 BLOCK = 5  # samples that are one from UNTIL_S on
 CLOSE = 1e-5  # of a pole, nearer than which two are not told apart
@@ -65,6 +70,7 @@ class _Data:
     period: float
     tilting: Tilting = ANY
     noise: float = 0.0
+    unlike: bool = False  # what fades
 
     def alone(self, x: Array) -> Array:
         """What is left of the position by one oscillation, x = (-Re p, Im p, 1/constant)."""
@@ -82,17 +88,21 @@ class _Data:
         return self.weight, fading * self.weight
 
     def columns(self, x: Array) -> Array:
-        """Of what is linear, (2 n, 9): level and what fades, of position and of tilt, the parts of C and D, and the tilt's t
-        e^(-t/constant); equation 1 with x = (-Re p, Im p, Re d, Im d, Re e, Im e, ln r, 1/constant), rates over SCALE."""
+        """Of what is linear, (2 n, 9 or 11): level and what fades, of position and of tilt, the parts of C and D, the tilt's t
+        e^(-t/constant), and of `unlike` fades t² e^(-t/constant) of both; equation 1 with x = (-Re p, Im p, Re d, Im d, Re e,
+        Im e, ln r, 1/constant), rates over SCALE."""
         poles, shares = _modes(x)
         e = np.exp(np.outer(self.t, poles)) * shrinks(poles, self.period) * self.weight[:, None]
-        out = np.zeros((2 * len(self.t), 9))
+        out = np.zeros((2 * len(self.t), 11 if self.unlike else 9))
         for k, half in enumerate((slice(None, len(self.t)), slice(len(self.t), None))):
             out[half, 2 * k], out[half, 2 * k + 1] = self._slow(x[-1])
             for j in (0, 1):
                 column = e @ shares[k, j]
                 out[half, 4 + 2 * j], out[half, 5 + 2 * j] = column.real, -column.imag
-        out[half, 8] = out[half, 3] * self.t * SCALE * x[-1]
+        late = self.t * SCALE * x[-1]
+        out[half, 8] = out[half, 3] * late
+        if self.unlike:
+            out[: len(self.t), 9] = out[half, 10] = out[half, 3] * late**2
         return out
 
     def both(self, x: Array) -> Array:
@@ -109,14 +119,15 @@ class _Data:
         if len(x) == 3:
             level, fades, real, imag = map(float, _solved(self._one(x), self.seen[:, 0]))
             poles, parts = np.array([SCALE * complex(-x[0], x[1])]), np.array([complex(real, imag)])
+            apart = 0.0
         else:
             terms = _solved(self.columns(x), self.seen.T.ravel())
-            level, fades = float(terms[0]), float(terms[1])
+            level, fades, apart = float(terms[0]), float(terms[1]), float(terms[9]) if self.unlike else 0.0
             poles, shares = _modes(x)
             parts = complex(terms[4], terms[5]) * shares[0, 0] + complex(terms[6], terms[7]) * shares[0, 1]
         turned = poles.imag < 0
         poles, parts = np.where(turned, poles.conj(), poles), np.where(turned, parts.conj(), parts)
-        return Swing(poles, parts, level, 0.0, 0.0, fades, 1 / (SCALE * float(x[-1])))
+        return Swing(poles, parts, level, 0.0, 0.0, fades, 1 / (SCALE * float(x[-1])), apart, self.unlike)
 
 
 def _modes(x: Array) -> tuple[Complex, Complex]:
@@ -139,6 +150,13 @@ def _solved(a: Array, seen: Array) -> Array:
     return np.asarray(np.linalg.lstsq(a.T @ a, a.T @ seen, rcond=None)[0])
 
 
+def hardly_swings(swing: Swing) -> bool:
+    """Whether one of two oscillations beside what fades is so heavily damped that it is open whether it counts, and their mean
+    pole depends on that."""
+    damping = -swing.poles.real / np.abs(swing.poles)
+    return bool(swing.doubts) and bool((damping > NEARLY).any()) and swing.torn > TORN
+
+
 def fitted(steps: Sequence[One], constant: float, start: Swing | None = None, tilting: Tilting = ANY) -> Swing:
     """Beside what fades with about that time constant, s; one oscillation where nothing tilts. `start`: a fit to nearly the
     same steps; `tilting`: what is known of the shaft's.
@@ -149,16 +167,28 @@ def fitted(steps: Sequence[One], constant: float, start: Swing | None = None, ti
     data = _data(steps, constant, tilting)
     try:
         if start is not None and len(start.found):
-            return _searched(replace(data, noise=start.misfit * _rms(data.weight)), np.array(start.found))
+            data = replace(data, noise=start.misfit * _rms(data.weight), unlike=start.unlike)
+            return _searched(data, np.array(start.found))
         pole = first_pole(steps) or guess(steps[0]) * complex(-DAMPED, 1.0)
         one = _searched(data, np.array([-pole.real, pole.imag, 1 / constant]) / SCALE)
         if not np.any(data.seen[:, 1]):
             return one
         x = np.array(one.found)
         x0 = np.array([x[0], x[1], 0.0, 0.0, 0.0, 0.0, tilting.weighs, x[2]])
-        return _searched(replace(data, noise=one.misfit * _rms(data.weight)), x0)
+        alike = _searched(replace(data, noise=one.misfit * _rms(data.weight)), x0)
+        return _by_what_fades(replace(data, noise=alike.misfit * _rms(data.weight), unlike=True), alike)
     except (ValueError, OverflowError, np.linalg.LinAlgError) as error:
         raise AnalysisError(f"no oscillation fits the response: {error}") from error
+
+
+def _by_what_fades(data: _Data, alike: Swing) -> Swing:
+    """The fit to `data` whose fades are unlike where that explains more than noise would, else the one where they are alike."""
+    try:
+        seen = _searched(data, np.array(alike.found))
+    except AnalysisError:
+        return alike
+    more = 2 * len(data.t) * ((alike.misfit / seen.misfit) ** 2 - 1)
+    return seen if more > ASKED else alike
 
 
 def _searched(data: _Data, x0: Array) -> Swing:

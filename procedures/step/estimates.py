@@ -18,7 +18,7 @@ from procedures.shared.certificates import certified
 from procedures.step import response, settling
 from procedures.step import steps as step_steps
 from procedures.step.acting import START_S
-from procedures.step.coupled import Tilting
+from procedures.step.coupled import Tilting, hardly_swings
 from procedures.step.fit import swing
 from procedures.step.oscillation import One, Swing
 from procedures.step.position import leans, shares, tilting_of
@@ -199,6 +199,8 @@ def _oscillation(group: str, results: Sequence[Result], rig: RigFile, start: flo
     kinds, n = [(r.case, o.begin) for r in results for o in r.ones], len(ones)
     try:
         whole = swing(ones, tilting=tilting)
+        if hardly_swings(whole):
+            return {}
         left = [swing(ones[:k] + ones[k + 1 :], whole, tilting) for k in range(n)]
     except AnalysisError:
         return {}
@@ -232,6 +234,19 @@ def _oscillation(group: str, results: Sequence[Result], rig: RigFile, start: flo
         if lag is not None:
             slope = (of(whole.later(-START_S)) - of(whole.later(START_S))) / (2 * START_S)
             out[name] += replace(lag * slope, unit=unit)
+    return out
+
+
+def groups_torn(results: Mapping[Case, Result], rig: RigFile) -> set[str]:
+    """Groups of steps in which one of two oscillations hardly swings."""
+    out = set()
+    for group in {c.group for c in results}:
+        of = [r for c, r in results.items() if c.group == group and not leans(rig, c.axis)]
+        try:
+            if of and hardly_swings(swing([o for r in of for o in r.ones], tilting=tilting_of(rig))):
+                out.add(group)
+        except AnalysisError:
+            continue
     return out
 
 

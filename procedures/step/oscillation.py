@@ -27,10 +27,11 @@ OF_ITS_OWN = 0.75  # of the pole that carries most: what lies farther from it is
 
 @dataclass(frozen=True)
 class Swing:
-    """Position as a share of the step: level + slope t + fades e^(-t/constant) + Re sum of parts e^(poles t), t s from the
-    control's answer; `misfit` rms. Where nothing fades fast `constant` is 0. `found`: where a search for nearly the same
-    begins; `doubts`: what it would be, were what was taken for granted of a second
-    oscillation off by its standard uncertainty, one thing after the other (`coupled`)."""
+    """Position as a share of the step: level + slope t + (fades + apart (t/constant)²) e^(-t/constant) + Re sum of parts
+    e^(poles t), t s from the control's answer; `misfit` rms. Where nothing fades fast `constant` is 0; `unlike`: two things
+    fade with constants that are not alike, hence `apart`. `found`: where a search for nearly the same begins; `doubts`: what it
+    would be, were what was taken for granted of a second oscillation off by its standard uncertainty, one thing after the other
+    (`coupled`)."""
 
     poles: Complex
     parts: Complex
@@ -39,6 +40,8 @@ class Swing:
     misfit: float
     fades: float = 0.0
     constant: float = 0.0
+    apart: float = 0.0
+    unlike: bool = False
     found: tuple[float, ...] = ()
     doubts: tuple[Swing, ...] = ()
 
@@ -50,11 +53,24 @@ class Swing:
         swings = (size > SLOW_HZ) & (size < FAST_HZ) & (-self.poles.real < HARD * np.abs(self.poles))
         if not swings.any():
             return complex(np.nan)
-        carried = np.abs(self.parts) ** 2 / np.maximum(-self.poles.real, 1 / UNTIL_S)
-        lead = self.poles[int(np.argmax(np.where(swings, carried, -1.0)))]
+        lead = self._lead(swings)
         swings &= np.abs(self.poles - lead) < OF_ITS_OWN * np.abs(lead)
         whole = self.parts[swings].sum()
         return complex((self.parts * self.poles)[swings].sum() / whole) if whole else complex(np.nan)
+
+    def _lead(self, of: npt.NDArray[np.bool_]) -> complex:
+        """The pole among them that carries most."""
+        carried = np.abs(self.parts) ** 2 / np.maximum(-self.poles.real, 1 / UNTIL_S)
+        return complex(self.poles[int(np.argmax(np.where(of, carried, -1.0)))])
+
+    @property
+    def torn(self) -> float:
+        """By how much of itself the pole that carries most is moved by a mean with those nearer than OF_ITS_OWN, be they hardly
+        swinging."""
+        lead = self._lead(np.ones(len(self.poles), bool))
+        near = np.abs(self.poles - lead) < OF_ITS_OWN * np.abs(lead)
+        mean = (self.parts * self.poles)[near].sum() / self.parts[near].sum()
+        return float(abs(mean - lead) / abs(lead))
 
     @property
     def damping(self) -> float:
@@ -81,7 +97,10 @@ class Swing:
 
     def _slow(self, t: Array, shrunk: float = 1.0) -> Array:
         line = self.level + self.slope * t
-        return line + self.fades * shrunk * np.exp(-t / self.constant) if self.constant else line
+        if not self.constant:
+            return line
+        late = t / self.constant
+        return np.asarray(line + (self.fades + self.apart * late**2) * shrunk * np.exp(-late))
 
     def means(self, t: Array, period: float) -> Array:
         """Means over the period before t; beyond what was fitted (where one of the two may even grow) with the mean pole."""

@@ -125,6 +125,29 @@ def test_a_fast_integrator_is_fitted_beside_the_swing() -> None:
     assert fit.swing(slow).constant == 0.0  # a straight line does while the shaft swings
 
 
+@pytest.mark.parametrize("second_s", [0.048, 0.025])
+def test_what_two_integrators_leave_may_fade_unlike(second_s: float) -> None:
+    """Two heavily damped oscillations of position and tilt by equation 1 (numpy's eigenvectors), and what the integrators of
+    unlike bearings leave, 0.05 and 0.025 s. Taken to fade alike it moves the mean pole by 23 %."""
+    rng, t, period = np.random.default_rng(5), np.arange(-20, 1500) * 5e-4, 5e-4
+    p, d, e = -410 + 270j, -20 + 150j, 20 + 110j
+    poles, shapes = np.linalg.eig(np.array([[p, 0.6 * e], [e, p + d]]))
+    parts = shapes * np.linalg.solve(shapes, np.array([-1.0 + 0.9j, 0.1 - 0.05j]))
+    after = np.maximum(t, 0)
+    swung = (np.exp(np.outer(after, poles)) @ (parts * oscillation.shrinks(poles, period)).T).real.T
+    first, second = (np.exp(-after / c) for c in (0.05, second_s))
+    seen = np.array([1 + 0.15 * first + 0.1 * second, 0.08 * (first - second)]) + swung
+    seen = np.where(t > 0, seen, 0.0)
+    ones = [oscillation.One(t, seen + 1.5e-3 * rng.normal(size=seen.shape)) for _ in range(16)]
+    found = fit.swing(ones, tilting=coupled.Tilting(math.log(0.6), 0.25))
+    true = (parts[0] * poles).sum() / parts[0].sum()
+    assert found.unlike is (second_s == 0.025)
+    assert abs(found.pole) == pytest.approx(abs(true), rel=0.04)
+    assert found.damping == pytest.approx(-true.real / abs(true), abs=0.02)
+    near = (t > oscillation.FROM_S) & (t < 0.3)
+    assert np.abs(found.means(t[near], period) - seen[0, near]).max() < 2e-3
+
+
 def test_oscillations_that_lie_apart_are_not_averaged() -> None:
     """A shaft that leans, its centre of mass beyond a bearing: 146 Hz that hardly swings, and 23.7 Hz that goes on."""
     poles, parts = np.array([-862.7 + 316.8j, -17.0 + 147.7j]), np.array([-0.11 + 0.7j, -0.48 + 0.05j])
