@@ -65,10 +65,10 @@ class Swing:
 
     @property
     def torn(self) -> float:
-        """By how much of itself the pole that carries most is moved by a mean with those nearer than OF_ITS_OWN, be they hardly
-        swinging."""
+        """By how much of itself the pole that carries most is moved by a mean with those nearer than OF_ITS_OWN of the greater,
+        be they hardly swinging."""
         lead = self._lead(np.ones(len(self.poles), bool))
-        near = np.abs(self.poles - lead) < OF_ITS_OWN * np.abs(lead)
+        near = np.abs(self.poles - lead) < OF_ITS_OWN * np.maximum(np.abs(self.poles), abs(lead))
         mean = (self.parts * self.poles)[near].sum() / self.parts[near].sum()
         return float(abs(mean - lead) / abs(lead))
 
