@@ -237,10 +237,10 @@ def _oscillation(group: str, results: Sequence[Result], rig: RigFile, start: flo
     return out
 
 
-def groups_torn(results: Mapping[Case, Result], rig: RigFile) -> set[str]:
-    """Groups of steps in which one of two oscillations hardly swings."""
+def groups_torn(results: Mapping[Case, Result], groups: Mapping[str, Mapping[str, Estimate]], rig: RigFile) -> set[str]:
+    """Those of `groups` that tell no damping, since one of two oscillations hardly swings."""
     out = set()
-    for group in {c.group for c in results}:
+    for group in (name for name, told in groups.items() if "damping" not in told):
         of = [r for c, r in results.items() if c.group == group and not leans(rig, c.axis)]
         try:
             if of and hardly_swings(swing([o for r in of for o in r.ones], tilting=tilting_of(rig))):

@@ -185,7 +185,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     by_case = estimates.by_case(steps, recording.rig, plan.band)
     by_group = estimates.by_group(steps, by_case, recording.rig)
     findings.add(frame.describe(recording.rig, plan.axes))
-    leaning, torn = leans(recording.rig), estimates.groups_torn(by_case, recording.rig)
+    leaning, torn = leans(recording.rig), estimates.groups_torn(by_case, by_group, recording.rig)
     findings.add(checks.of_results(by_case, by_group, plan, leaning=leaning, torn=torn))
     findings.add(slewing.of_sizes(by_case))
     findings.add(slewing.of_starts(steps))
