@@ -36,6 +36,12 @@ def told(run: Simulated) -> dict[tuple[str, str], float]:
     return {(m.quantity.name, m.where): m.estimate.value for m in run.results if isinstance(m, Measured)}
 
 
+def lacking(run: Simulated) -> set[str]:
+    """What a record would call missing, so that its outcome is an error."""
+    needed = {q.name for q in run.procedure.measures if q not in run.procedure.optional}
+    return needed - {name for name, _ in told(run)}
+
+
 def wrong(run: Simulated) -> list[str]:
     return [f.code for f in run.results if isinstance(f, Finding) and f.effect is not Effect.NOTE]
 
@@ -100,6 +106,7 @@ def test_a_bearing_that_holds_more_softly(tmp_path: Path, softer: float, told_of
     )
     assert wrong(run) == []
     assert ("oscillations-unlike" in {f.code for f in run.results if isinstance(f, Finding)}) is not told_of
+    assert lacking(run) == set()
     seen = [m for m in run.results if isinstance(m, Measured) and m.quantity.name in ("damping", "natural_frequency")]
     assert len(seen) == (2 if told_of else 0)
     truth = truth_of_motion(run)

@@ -155,7 +155,7 @@ def _result(axis: str, speed: float, taken: Sequence[Taken]) -> Result:
         best = found[0]
         dof = best.taken.dof
         estimates["s_max"] = _typed(
-            best.top.value, best.top.u, "1", f"{where}/s_max", "scatter over the periods, at the peak", dof
+            best.top.value, best.top.u, "1", f"{where}/s_max", "noise of the lines, at the peak", dof
         )
         estimates["s_max_hz"] = _typed(
             best.top.at, best.top.u_at, "Hz", f"{where}/s_max_hz", "scatter of the peak's place", dof

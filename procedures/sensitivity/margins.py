@@ -75,7 +75,7 @@ def margins(surveys: Sequence[Taken], where: str, modes: Sequence[Taken] = ()) -
         if of is not None:
             identity = f"scatter/{where}/{name}"
             out[name] = Estimate.of(
-                of[0], Influence(identity, "scatter over the periods", of[1], unit, "A", "normal", dof[name])
+                of[0], Influence(identity, "noise of the lines", of[1], unit, "A", "normal", dof[name])
             )
     if "gain_increase" in out:  # that of L is what scatters alike to both sides
         out["gain_increase"] = replace(1 / out["gain_increase"], unit="1")

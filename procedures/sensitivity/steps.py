@@ -1,4 +1,4 @@
-"""From captures under injection to the sensitivity at each line: S = after/inject, with its scatter over the periods."""
+"""From captures under injection to the sensitivity at each line: S = after/inject, with its noise."""
 
 from __future__ import annotations
 
