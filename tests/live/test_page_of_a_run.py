@@ -182,7 +182,7 @@ def test_stop_in_the_middle_of_a_sleep_lands_within_a_fifth_of_a_second(watched:
 
 @pytest.mark.parametrize("stage", ["bring the rig to LEVITATED", "acquire", "make safe", "analyse", "report"])
 def test_stop_in_any_part_of_a_run_ends_it_aborted_with_one_finding(watched: Watched, stage: str) -> None:
-    """As a signal does (tests/test_runner.py); while the report is built too, where it comes from another thread."""
+    """As a signal does (tests/test_runner_stopped.py); while the report is built too, where it comes from another thread."""
 
     class Stopping(PlainProgress):
         def stage(self, text: str) -> None:

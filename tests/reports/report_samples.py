@@ -1,16 +1,22 @@
-"""Hand-written records and rigs, with the fields that record.json and a rig file have."""
+"""Hand-written records and rigs, with the fields that record.json and a rig file have, and pages read by their words."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from html.parser import HTMLParser
 from typing import Any
 
 import numpy as np
 
 from bench.figures import Figure, Series
+from bench.procedure import Quantity
+from reports import compose
+from reports.view import ReportView
 
 HOSTILE = '<script>alert("x")</script> #include "a.typ" [b] $x^2$ \\n *c* _d_ `e` @f // g {{ 7*7 }} &amp; ~'
 RUN_ID = "amb-calibration-20260101T000000Z-3f2a"
+K_I = Quantity("K_i", "N/A", "inboard AMB: dF/di at zero control current")
+TITLE = "AMB force-current constants"
 
 
 def budget() -> list[dict[str, Any]]:
@@ -172,3 +178,36 @@ def figures() -> list[Figure]:
             Figure(f"step-{key}", f"One step, {place}", "2 kg hung at t = 0.", "time / s", "position / µm", curves)
         )
     return made
+
+
+def around(**changes: Any) -> compose.Surroundings:
+    sample = SampleRecording()
+    made = compose.Surroundings(
+        title=TITLE,
+        method="Masses are hung.\n\nA fit is made.",
+        definitions={"K_i": K_I.about},
+        rig=rig_content(),
+        integrity=sample.integrity,
+    )
+    return replace(made, **changes)
+
+
+def view(surroundings: compose.Surroundings | None = None, **changes: Any) -> ReportView:
+    return compose.view_of(record(**changes), surroundings or around())
+
+
+class Page(HTMLParser):
+    """The words of a page, and its tags."""
+
+    def __init__(self, source: str) -> None:
+        super().__init__()
+        self.words: list[str] = []
+        self.tags: list[str] = []
+        self.feed(source)
+        self.text = " ".join(" ".join(self.words).split())
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+
+    def handle_data(self, data: str) -> None:
+        self.words.append(data)

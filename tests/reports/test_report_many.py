@@ -5,8 +5,7 @@ from __future__ import annotations
 import string
 
 import pytest
-from report_samples import HOSTILE, measurement, record
-from test_report_build import Page, around
+from report_samples import HOSTILE, Page, around, measurement, record
 
 from reports import compose, html, many, pdf
 from reports.counts import counts
