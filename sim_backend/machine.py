@@ -136,7 +136,8 @@ class Truth:
     """Every drawn value by name, planted defects, and what follows from them. `seed` says which machine, `visit` which day,
     `stretch` how often its run had been stopped and
     continued.
-    `seen`: axis and true place, m or rad, of each reading of an instrument outside the loop, in their order."""
+    `told` are the names of what was not drawn but said, so that it is not drawn anew either; `seen`: axis and true place, m or
+    rad, of each reading of an instrument outside the loop, in their order."""
 
     seed: int
     values: Mapping[str, float]
@@ -146,6 +147,7 @@ class Truth:
     machine: Machine
     visit: int = 0
     stretch: int = 0
+    told: frozenset[str] = frozenset()
     seen: list[tuple[str, float]] = field(default_factory=list, compare=False, repr=False)
 
     @property

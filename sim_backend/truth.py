@@ -56,10 +56,14 @@ def draw(
                 f"--truth {name}: no such value; {'did you mean' if close else 'expected one of'} {', '.join(close or known)}"
             )
         table[name] = float(value)
+    if fixed := {k: float(v) for k, v in wanted.items() if k in rig.simulation and k not in tolerances}:
+        # nothing draws these: the machine takes them from its rig file, by which its other numbers were drawn
+        machine = machine_of(rig.model_copy(update={"simulation": {**rig.simulation, **fixed}}))
     for name, value in targets.items():
         values[machine.targets[name]] *= value / machine.quantities(machine.params(values, defects), used)[name]
     plant = machine.params(values, defects)
-    return Truth(seed, values, defects, plant, machine.quantities(plant, used), machine, visit, stretch)
+    quantities = machine.quantities(plant, used)
+    return Truth(seed, values, defects, plant, quantities, machine, visit, stretch, frozenset(wanted))
 
 
 def nominal(rig: RigFile) -> Mapping[str, float]:

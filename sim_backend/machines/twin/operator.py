@@ -70,6 +70,8 @@ class Fitter:
         return label == "-" or f"masses.{label}" in self._truth.values
 
     def _drawn(self, name: str, what: str, count: int) -> float:
+        if name in self._truth.told:
+            return self._truth.values[name]
         return draw_one(
             drawn(self._rig)[name], self._truth.seed, self._truth.anew(f"{what}:{count}"), self._truth.visit
         )
@@ -126,19 +128,20 @@ class Fitter:
         if not defects["weight_lost"]:
             self._plant.weights(k, (mass + heavier) * radius, at)
 
-    def _errors(self, name: str, plane: BalancingPlane) -> tuple[float, float]:
+    def _errors(self, plane_name: str, plane: BalancingPlane) -> tuple[float, float]:
         """Of one weight: kg and rad, each weight by itself."""
         out = []
         for k, key in enumerate(("weight_mass", "weight_angle")):
             stated = getattr(plane, key)
-            found = None if stated is None else self._geometry.places.number(stated, f"balancing.{name}.{key}")
-            draw = (
-                0.0
-                if found is None
-                else draw_one(
-                    found.number, self._truth.seed, self._truth.anew(f"weight:{k}:{self._fixed}"), self._truth.visit
-                )
-            )
+            name = f"balancing.{plane_name}.{key}"
+            found = None if stated is None else self._geometry.places.number(stated, name)
+            if name in self._truth.told:
+                draw = self._truth.values[name]
+            elif found is None:
+                draw = 0.0
+            else:
+                count = self._truth.anew(f"weight:{k}:{self._fixed}")
+                draw = draw_one(found.number, self._truth.seed, count, self._truth.visit)
             out.append(draw)
         return out[0], out[1]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from bench.rigfile import RigFile
 from sim_backend.machines.twin.columns import Columns
@@ -128,13 +128,21 @@ def params(rig: RigFile, v: Numbers, d: Numbers) -> TwinParams:
         **_flexible(columns, v), **_amplifiers(columns, v), **_probes(columns, v, d), **_mark(columns, v, d),
     }  # fmt: skip
     return TwinParams(
-        control=control_of(rig), names=told_of(rig, d), radial=len(layout.radial), axial=int(layout.axial is not None),
+        control=_control(rig, d), names=told_of(rig, d), radial=len(layout.radial), axial=int(layout.axial is not None),
         probes=len(layout.probes), rings=len(layout.rings), planes=len(layout.planes),
         bearings=len(rig.bearings), tick=n.tick_s, period=n.period_ticks,
         readings=int(rig.binding.samples == "reading"), free_tilt=float(free.tilts), free_radial=free.radial,
         coil_limit=n.current_limit, own_slew=d["own_slew"], trip_current=n.set("trip_current", 1.15 * n.current_limit),
         trip_speed=n.set("trip_speed", 1.1 * rig.envelope.max_speed_rad_s), **parts,  # type: ignore[arg-type]
     )  # fmt: skip
+
+
+def _control(rig: RigFile, d: Numbers) -> TwinControl:
+    """With integrators as slow as planted, also where no parameter sets them."""
+    control = control_of(rig)
+    if d["integrator_factor"] == 1.0:  # the cached one, as it is
+        return control
+    return replace(control, ki=tuple(d["integrator_factor"] * ki for ki in control.ki))
 
 
 def padded(values: Sequence[float], length: int, fill: float = 0.0) -> Many:
