@@ -243,3 +243,18 @@ def test_what_a_procedure_lacks_is_told_by_tables_and_names(path: str) -> None:
     lines = [line for said in lacking.values() for line in said]
     assert all(line.partition(": ")[2] for line in lines)
     assert any("no injection" in line for line in lacking["sensitivity"]) == (path == SPINDLE)
+
+
+def test_an_orbit_ends_as_smoothly_as_it_began(tmp_path: Path) -> None:
+    """It shrinks from where its last point was: the set points jumped across the whole ellipse, which tripped a shaft of less
+    room, and took the stand's to twice its orbit."""
+    run = simulated_run("tracking", STAND, 1, {"settle_s": 1.0, "revolutions": 6.0}, tmp_path / "t.mcap")
+    assert wrong(run) == []
+    recording = run.recording
+    (orbit,) = recording.steps("orbit")
+    for name in ("LageYVorn", "LageYHinten", "LageXVorn", "LageXHinten"):
+        within, after = (
+            np.abs(recording.channel(name, *span)[name]).max()
+            for span in ((orbit.start_ns, orbit.end_ns), (orbit.end_ns, orbit.end_ns + 2_000_000_000))
+        )
+        assert after < 1.1 * within

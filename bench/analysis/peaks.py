@@ -9,6 +9,8 @@ excess and its quantiles are taken off (basic parametric bootstrap, Davison and 
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,7 +70,7 @@ def peak(x: npt.ArrayLike, values: npt.ArrayLike, covariance: Array, *, seed: in
     pooled = pooled_covariance(covariance)
     chosen = _near_top(z, pooled)
     weight = 1 / np.maximum(np.trace(pooled, axis1=1, axis2=2), 1e-300)
-    width = _width(place, z, weight)
+    width = _width(place, z, weight, int(np.argmax(np.abs(z))))
     at = _windows(place, chosen, width)
     found, where = _top(z, at, weight, place[chosen])
     smooth = _models(z, _windows(place, np.arange(z.size), width), weight)[..., 0]
@@ -82,7 +84,7 @@ def peak(x: npt.ArrayLike, values: npt.ArrayLike, covariance: Array, *, seed: in
         float(found - (high - base)),
         float(drawn.std()),
         float(where),
-        float(places.std()),
+        max(float(places.std()), _apart(place, where) / math.sqrt(12)),
         float(np.abs(z).max()),
         bias,
     )
@@ -125,24 +127,27 @@ class Smoother:
         return np.asarray((low - 2 * at + high) / (NARROW * self._windows.scale) ** 2)
 
 
-def smoother(x: Array, values: Complex, covariance: Array, lines: int | None = None) -> Smoother:
+def smoother(
+    x: Array, values: Complex, covariance: Array, lines: int | None = None, *, about: Sequence[float] = ()
+) -> Smoother:
     """For curves at `x` (m,) ascending that scatter by `covariance` (m, 2, 2) about something like `values` (m,). A model takes
-    `lines` lines, or else as many as the noise lets it explain about the greatest of `values`."""
+    `lines` lines, or else as many as the noise lets it explain about the greatest of `values` and `about` other places: a
+    broad summit allows for more lines than a narrow one of nearly its height."""
     weight = 1 / np.maximum(np.trace(covariance, axis1=1, axis2=2), 1e-300)
-    windows = _windows(x, np.arange(x.size), lines or _width(x, values, weight))
+    looked = {int(np.argmax(np.abs(values))), *(int(np.argmin(np.abs(x - one))) for one in about)}
+    windows = _windows(x, np.arange(x.size), lines or min(_width(x, values, weight, k) for k in looked))
     places = (x[:, None] + windows.between * windows.scale[:, None]).ravel()
     order = np.argsort(places, kind="stable")
     return Smoother(places[order], windows, weight, order)
 
 
-def _width(x: Array, z: Complex, weight: Array) -> int:
-    """The most lines with which the local models about the greatest line misfit by no more than the noise explains."""
-    top = int(np.argmax(np.abs(z)))
+def _width(x: Array, z: Complex, weight: Array, line: int) -> int:
+    """The most lines with which the local models about a line misfit by no more than the noise explains."""
     width = WINDOW
     for w in WINDOWS[1:]:
         if w > z.size:
             break
-        near = np.arange(max(0, top - w // 2), min(z.size, top + w // 2 + 1))
+        near = np.arange(max(0, line - w // 2), min(z.size, line + w // 2 + 1))
         at = _windows(x, near, w)
         if _misfit(z, at, weight).mean() > 1 + 2 / np.sqrt(w - 4):
             break
@@ -231,6 +236,12 @@ def _evaluated(z: Complex, at: _Windows, weight: Array, v: Array) -> Complex:
 def _applied(matrices: Array, columns: Complex) -> Complex:
     """Real matrices (k, i, j) on complex columns (k, j, n)."""
     return np.asarray(np.matmul(matrices, columns.view(np.float64))).view(np.complex128)
+
+
+def _apart(x: Array, where: float) -> float:
+    """How far the places about `where` are apart at which the models are looked at."""
+    k = int(np.argmin(np.abs(x - where)))
+    return float(np.diff(x[max(k - 1, 0) : k + 2]).max()) / FINE
 
 
 def _top(z: Complex, at: _Windows, weight: Array, x: Array) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:

@@ -58,7 +58,7 @@ def leans(rig: RigFile, axis: str = "y") -> bool:
     """Whether a bearing's axes, each with a control of its own, are not at right angles: y and z then share oscillations. With
     a between them the axes' stiffnesses go together as 1 + cos a and 1 - cos a, which lie far apart. Never along x."""
     machine = conventions(rig)
-    own = axis != "x" and machine.probed and not machine.can.set_points.shaft
+    own = axis != "x" and not machine.can.set_points.shaft
     return own and abs(math.cos(_between(rig))) >= SQUARE
 
 

@@ -26,7 +26,8 @@ def sizes(rig: RigFile, plan: Plan) -> tuple[float, float]:
 
 
 def follow(rig: Rig, plan: Plan, record: Recorder, labels: Mapping[str, Any], orbit: str) -> None:
-    """The ellipse grows from the middle, is gone through, and shrinks again; each set point is recorded with its time."""
+    """The ellipse grows from the middle, is gone through, shrinks again from where it ended; each set point is recorded with
+    its time."""
     machine, (half_y, half_z) = conventions(rig.file), sizes(rig.file, plan)
     hold_ns = round(1e9 / plan.points_hz / plan.points)
     slew = machine.can.set_points.slew
@@ -36,6 +37,7 @@ def follow(rig: Rig, plan: Plan, record: Recorder, labels: Mapping[str, Any], or
         lift.write(rig, machine.points({"y": 0.0, "z": half_z * part / GROW}))
         rig.clock.sleep(GROW_S)
     rig.clock.sleep(plan.settle_s)
+    y, z = 0.0, half_z
     with record.step(orbit, **labels):
         begin = rig.clock.now_ns()
         for k, (y, z) in enumerate(_around(plan, half_y, half_z)):
@@ -46,7 +48,7 @@ def follow(rig: Rig, plan: Plan, record: Recorder, labels: Mapping[str, Any], or
             lift.write(rig, machine.points({"y": y, "z": z}))
         rig.clock.sleep(hold_ns * 1e-9)
     for part in range(GROW - 1, -1, -1):
-        lift.write(rig, machine.points({"y": 0.0, "z": half_z * part / GROW}))
+        lift.write(rig, machine.points({"y": y * part / GROW, "z": z * part / GROW}))
         rig.clock.sleep(GROW_S)
     if slew:
         lift.write(rig, {slew: rig.file.parameters[slew].default})

@@ -30,6 +30,18 @@ def rig_of(path: str) -> RigFile:
     return load_rig(str(EXAMPLES / path))
 
 
+def _spindle(folder: Path, *changes: tuple[str, str]) -> str:
+    """The spindle's rig file with changes."""
+    text = (EXAMPLES / SPINDLE).read_text(encoding="utf-8")
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    for path in (EXAMPLES / SPINDLE).parent.glob("*.dbc"):
+        (folder / path.name).write_bytes(path.read_bytes())
+    (folder / "spindle.toml").write_text(text, encoding="utf-8")
+    return str(folder / "spindle.toml")
+
+
 def asked(
     rig: RigFile, points: Mapping[str, float], sizes: tuple[float, ...] = (1e-5,), speed: float = 0.0
 ) -> StepsAsked:
@@ -58,12 +70,7 @@ def test_small_steps_swing_as_the_slowest_mode_of_the_linear_model() -> None:
 
 def test_axes_that_are_not_at_right_angles_have_z_across_y(tmp_path: Path) -> None:
     """A step along z moves the second axis of each bearing by sin a, and the shaft by the whole of it across y."""
-    folder = EXAMPLES / "vertical-spindle"
-    for path in folder.glob("*.dbc"):
-        (tmp_path / path.name).write_bytes(path.read_bytes())
-    text = (folder / "spindle.toml").read_text(encoding="utf-8")
-    (tmp_path / "spindle.toml").write_text(text.replace("plus_deg = 90", "plus_deg = 60"), encoding="utf-8")
-    rig = load_rig(str(tmp_path / "spindle.toml"))
+    rig = load_rig(_spindle(tmp_path, ("plus_deg = 90", "plus_deg = 60")))
     points = conventions(rig).point("z", 1.0)
     assert sorted(points) == ["TargetLowerV", "TargetUpperV"]
     assert [*points.values()] == pytest.approx([math.sin(math.radians(60))] * 2)
@@ -76,7 +83,30 @@ def test_axes_that_are_not_at_right_angles_have_z_across_y(tmp_path: Path) -> No
     assert not leans(rig_of(SPINDLE))
     told = procedure.on(rig).optional
     assert {"overshoot", "damping", "natural_frequency"} <= {q.name for q in told}
-    assert next(iter(describe(rig, "yz"))).text.count("z is across y, to the side of LowV") == 1
+    frame = next(iter(describe(rig, "yz"))).text
+    assert "y is along LowU and UppU, 30°" in frame
+    assert "z is across y, to the side of LowV and UppV, 120°" in frame  # LowV itself is at 90 degrees
+
+
+def test_a_probe_that_counts_the_other_way_makes_no_axes_square(tmp_path: Path) -> None:
+    """With axes 60 degrees apart one oscillation was fitted to two, as soon as a probe read against its axis: 17 U off."""
+    rig = load_rig(
+        _spindle(
+            tmp_path,
+            ("plus_deg = 90", "plus_deg = 60"),
+            ('channel = "DispUpperV"', 'channel = "DispUpperV", sign = -1'),
+        )
+    )
+    assert not conventions(rig).probed
+    assert leans(rig)
+
+
+def test_bearings_that_are_turned_to_each_other(tmp_path: Path) -> None:
+    """y is along the first axis of the bearing nearest to the near end; the other bearing's lies beside it."""
+    upper = "axes.UppU = { direction = { value = "
+    rig = load_rig(_spindle(tmp_path, (f"{upper}30", f"{upper}40")))
+    assert "y is along LowU, 30° from" in next(iter(describe(rig, "yz"))).text
+    assert "(UppU is at 40°)" in next(iter(describe(rig, "yz"))).text
 
 
 def test_what_probes_tell_of_a_step_is_off_by_their_gains() -> None:
