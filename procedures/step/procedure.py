@@ -25,6 +25,7 @@ from procedures.amb_rotor import frame, lift
 from procedures.amb_rotor.conventions import conventions
 from procedures.shared import assumptions
 from procedures.step import capturing
+from procedures.step.held import check_sizes, planned
 from procedures.step.plan import Plan
 from procedures.step.position import leans
 from procedures.step.record_length import enough_s, faded_s
@@ -228,6 +229,7 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
                f"clearance, {machine.clearance * 1e6:g} um")  # fmt: skip
     if min(plan.sizes_m) <= 0 or len({*plan.sizes_m}) < len(plan.sizes_m) or len({*plan.axes}) < len(plan.axes):
         yield "sizes_m, axes: expected sizes above 0, and each once"
+    yield from check_sizes(rig, plan)
     if plan.names[0] == plan.names[1]:
         yield f"names: found {plan.names[0]!r} twice; the settings cannot be told apart"
     if any(0 < s < TURNING_RAD_S or s < 0 for s in plan.speeds_rad_s):
@@ -259,6 +261,7 @@ procedure = Procedure(
     optional=(SETTLING, DAMPING, FREQUENCY),  # what does not settle is a finding, what does not swing a note
     state=RigState.LEVITATED,
     plan=Plan,
+    planned=planned,
     acquire=acquire,
     evaluate=evaluate,
     measured=measured,
