@@ -14,6 +14,9 @@ DEPTH: Final = 32
 _KEY: Final = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
 _DEEP_KEY: Final = re.compile(rf"(?<![\w-]){_KEY}(?:[ \t]*+\.[ \t]*+{_KEY}){{{DEPTH}}}")
 _SHOWN: Final = 40
+_AT: Final = re.compile(r"at line (\d+), column (\d+)")
+_OF_KEYS: Final = ("Expected ']'", "Expected '='", "Invalid initial character for a key", "Invalid statement")
+"""How the parser's words begin where a key is at fault, or the header of a table."""
 
 
 class TomlError(ValueError):
@@ -57,11 +60,26 @@ def parse_toml(text: str) -> dict[str, Any]:
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise TomlError(f"not TOML: {error}") from error
+        raise TomlError(f"not TOML: {error}{_in_quotes(text, str(error))}") from error
     except RecursionError:
         raise TomlError(_too_deep(_deepest_line(text))) from None
     _look_down(data)
     return data
+
+
+def _in_quotes(text: str, error: str) -> str:
+    """What to do about a key with a letter that has none of its own in TOML: `arrière`; nothing of any other error."""
+    at = _AT.search(error)
+    if at is None or not error.startswith(_OF_KEYS):
+        return ""
+    line, column = text.split("\n")[int(at[1]) - 1], int(at[2]) - 1
+    if column >= len(line) or line[column].isascii() or not line[column].isalnum():
+        return ""
+    begin = re.search(r"[\w-]*$", line[:column])
+    end = re.match(r"[\w-]*", line[column:])
+    assert begin is not None
+    assert end is not None
+    return f'; a name with other letters than A-Z, a-z, 0-9, _ and - is put in quotes: "{begin[0]}{end[0]}"'
 
 
 def _too_deep(key: str) -> str:

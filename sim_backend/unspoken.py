@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import suppress
 
+from bench import units
 from bench.errors import ConfigError, Problem
 from bench.rigfile import RigFile
 from bench.rigfile.messages import MessageMap, load_messages
@@ -27,12 +28,23 @@ def unspoken(rig: RigFile, machine: Machine) -> Iterator[Problem]:
     lacking = [name for name in rig.channels if told_as(rig, name, known) is None]
     free = ", ".join(sorted(known - {told_as(rig, n, known) for n in rig.channels}))
     for name in lacking:
+        found = f"what the simulated {machine.name} has no reading for"
         expected = f'`{name} = "READING"` under [simulation.readings], with one of {free}; or a run with --backend live'
-        yield Problem(rig.path, f"channels.{name}", f"what the simulated {machine.name} has no reading for", expected)
+        if _unread(rig, name):
+            found += ": no entry of [probes] has this channel"
+            expected = f'[probes] with channel = "{name}", where it reads the shaft; {expected}'
+        yield Problem(rig.path, f"channels.{name}", found, expected)
     if machine.columns is None:
         yield from _of_time(rig, messages, machine)
         yield from _of_controls(rig, machine)
     yield from _of_faults(rig)
+
+
+def _unread(rig: RigFile, channel: str) -> bool:
+    """Whether a channel is of a position, and no part of the machine is said to read it."""
+    unit = units.UNITS.get(rig.channels[channel].unit)
+    read = {probe.channel for probe in rig.probes.values()} | {encoder.channel for encoder in rig.encoders.values()}
+    return unit is not None and unit.si == "m" and channel not in read
 
 
 def _of_time(rig: RigFile, messages: MessageMap, machine: Machine) -> Iterator[Problem]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 from bench import units
@@ -28,6 +29,7 @@ def problems_of(rig: RigFile) -> Iterator[Problem]:
     """Each with its key, what was found and what is expected."""
     for key, found, expected in (
         *_parameters(rig),
+        *_shared(rig),
         *_names(rig),
         *_values(rig),
         *_motion(rig),
@@ -62,6 +64,14 @@ KINDS = {"set_points.axes": "m", "set_points.slew": "m/s", "set_points.slew_tilt
          "hold.begin": "s", "hold.push": "A", "hold.bound": "m", "hold.limit": "N",
          "motor.phase_slew": "rad/s", "motor.phase_limit": "rad", "motor.circle": "m", "motor.circle_hz": "Hz",
          "current_limit": "A", "landing_speed": "rad/s", "lift_time": "s", "watchdog": "s"}  # fmt: skip
+OWN = {group: re.compile(pattern) for group, pattern in {
+    "axes": r"set_points\.axes\..+", "shaft": r"set_points\.shaft\.[xyz]", "tilts": r"set_points\.shaft\.(psi|theta)",
+    "probes": r"motion\.radial\..+",
+    "loops": r"loop_injection\.loops\..+\.set_point", "targets": r"positioning\.axes\..+\.target",
+    "forces": r"force_currents\..+\.added", "motor": r"motor\.(along|across)", "held": r"motor\.ref_(along|across)",
+}.items()}  # fmt: skip
+"""Capabilities of which each entry has a parameter of its own, in groups that say one thing of a place each. Those of
+`current_steps` and `coil_map` are looked at with the rest of theirs."""
 COORDINATES = {"x": "m", "y": "m", "z": "m", "psi": "rad", "theta": "rad"}
 
 
@@ -69,6 +79,15 @@ def _parameters(rig: RigFile) -> Iterator[Line]:
     for key, parameter in parameters_named(rig.capabilities):
         if parameter not in rig.parameters:
             yield key, repr(parameter), f"a parameter of this file{near(parameter, rig.parameters)}"
+
+
+def _shared(rig: RigFile) -> Iterator[Line]:
+    """Two axes that one parameter would move. Gains, limits, rates and a bias may be those of several."""
+    taken: dict[tuple[str, str], str] = {}
+    for key, parameter in parameters_named(rig.capabilities):
+        for group, pattern in OWN.items():
+            if pattern.fullmatch(key) and (first := taken.setdefault((group, parameter), key)) != key:
+                yield key, parameter, f"a parameter of its own: it is that of {first}"
 
 
 def _units(rig: RigFile) -> Iterator[Line]:

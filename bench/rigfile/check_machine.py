@@ -4,6 +4,7 @@ of the wrong kind, channels that are not there."""
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Iterator
 from datetime import date
 from typing import Any
@@ -15,18 +16,21 @@ from bench.rigfile.check_places import contradictions
 from bench.rigfile.check_stages import encoders_of
 from bench.rigfile.elements import From, Of
 from bench.rigfile.model import RigFile
+from bench.rigfile.numbers import Term
 from bench.rigfile.placenames import places_named
 from bench.rigfile.places import CENTRE, PlaceError, Places
+from bench.rigfile.possible import beyond_likely
 from bench.rigfile.toleranced import Toleranced
 
 KINDS = {"at": "m", "by": "m", "gap": "m", "clearance": "m", "radius": "m", "length": "m", "offset": "m", "runout": "m",
          "centre_of_mass": "m", "ends": "m", "direction": "rad", "pull": "rad", "zero": "rad", "tilt": "rad",
-         "up": "rad",
+         "up": "rad", "hand_angle": "rad",
          "weight_angle": "rad", "misalignment": "rad", "mass": "kg", "weight_mass": "kg", "polar_inertia": "kg m^2",
          "transverse_inertia": "kg m^2", "stiffness": "N/m", "asymmetry": "1", "pole_pairs": "1", "friction": "1"}  # fmt: skip
 POSITIVE = ("gap", "clearance", "radius", "length", "mass", "polar_inertia", "transverse_inertia")
 LIKELY = {"gap": (1e-6, 1e-2), "clearance": (1e-6, 0.1), "radius": (1e-4, 10.0), "at": (0.0, 10.0), "by": (0.0, 10.0),
           "centre_of_mass": (0.0, 10.0)}  # m; what is beyond is a slip of the unit  # fmt: skip
+TURN_RAD = 2 * math.pi + 1e-6  # what is beyond was meant in degrees
 TABLES = ("shaft", "bearings", "probes", "mark", "rings", "balancing", "coupling", "hooks", "levers", "motors")
 # Those of encoders are looked at with the axes that they are (check_stages).
 
@@ -56,6 +60,7 @@ def _all(rig: RigFile) -> Iterator[Found]:
 
 def _numbers(rig: RigFile, places: Places) -> Iterator[Found]:
     """Each is of the kind that is asked for there, and lengths that can only be positive are."""
+    told = set[str]()
     for key, name, stated in (found for table in TABLES for found in _stated(getattr(rig, table), (table,))):
         try:
             term = places.number(stated, key)
@@ -67,12 +72,23 @@ def _numbers(rig: RigFile, places: Places) -> Iterator[Found]:
             yield key, f"{term.identity} in {term.number.unit}", f"a unit of the kind of {KINDS[name]}"
         elif name in POSITIVE and term.factor * term.number.value <= 0:
             yield key, f"{term.factor * term.number.value:g} {term.number.unit}", "a positive number"
-        elif (
-            isinstance(stated, Toleranced)
-            and name in LIKELY
-            and not (low := LIKELY[name][0]) <= abs(term.number.value) <= (high := LIKELY[name][1])
-        ):
-            yield key, f"{term.number.value:g} m", f"{low:g} to {high:g} m: look at the unit"
+        elif (unlikely := _unlikely(name, term, by_reference=isinstance(stated, str))) and term.identity not in told:
+            told.add(term.identity)
+            found, expected = unlikely
+            yield key, f"{term.identity}, {found}" if isinstance(stated, str) else found, expected
+
+
+def _unlikely(name: str, term: Term, *, by_reference: bool) -> tuple[str, str] | None:
+    """What is found and expected of a number that is a slip of its unit, wherever it stands; None also where it is told by
+    another check: a length where [geometry] has it, the tilt where the shaft has it."""
+    value, (table, _, entry) = term.number.value, term.identity.partition("/")
+    if KINDS[name] == "rad" and abs(value) > TURN_RAD and (by_reference or name != "tilt"):
+        expected = "one turn at most, -360 to 360 deg: write deg where degrees are meant"
+        return f"{value:g} rad, which is {math.degrees(value):g} deg", expected
+    low, high = LIKELY.get(name, (0.0, math.inf))
+    if low <= abs(value) <= high or (table == "geometry" and beyond_likely(entry, term.number)):
+        return None
+    return f"{value:g} m", f"{low:g} to {high:g} m: look at the unit"
 
 
 def _stated(tree: Any, path: tuple[str, ...]) -> Iterator[tuple[str, str, Toleranced | str]]:

@@ -18,12 +18,13 @@ APART_RAD = math.radians(10)  # two axes of a bearing that are nearer leave a di
 STANDS_RAD = math.radians(1)  # from upright
 AGREE = 3.0  # standard uncertainties of a span and of the places that it lies between, and
 AGREE_M = 1e-4  # what a drawing is rounded to
+ROUNDED = 1e-3  # share of an inertia or a mass, to which it is rounded
 Found = tuple[str, str, str]
 
 
 def contradictions(rig: RigFile, places: Places) -> Iterator[Found]:
     """Key, found and expected of each."""
-    for look in (_apart, _parallel, _upright, _ends, _spans, _rings):
+    for look in (_apart, _parallel, _upright, _ends, _spans, _rings, _inertias):
         yield from look(rig, places)
 
 
@@ -113,6 +114,47 @@ def _rings(rig: RigFile, places: Places) -> Iterator[Found]:
         if least is not None and clearance >= least.number.value:
             yield (_value_of(identity), f"{clearance:g} m",
                    f"less than {least.identity} = {least.number.value:g} m, or the journal strikes the AMB first")  # fmt: skip
+
+
+def _inertias(rig: RigFile, places: Places) -> Iterator[Found]:
+    """About its axis a body has as much inertia as about both others together, no more; about those no more than if all of its
+    mass were a shaft's length away, and what its thickness adds. Both but for their tolerances and rounded figures."""
+    shaft = rig.shaft
+    if shaft is None:
+        return
+    polar, transverse, mass = (
+        _number(places, getattr(shaft, key), f"shaft.{key}", unit)
+        for key, unit in (("polar_inertia", "kg m^2"), ("transverse_inertia", "kg m^2"), ("mass", "kg"))
+    )
+    if transverse is None:
+        return
+    if polar is not None and _least(polar) > 2 * _most(transverse):
+        yield ("shaft.polar_inertia", f"{polar.value:g} kg m^2",
+               f"at most {2 * transverse.value:.4g} kg m^2, twice transverse_inertia: no body has more")  # fmt: skip
+    ends = [_told(places.end, k) for k in (0, 1)] if shaft.ends is not None else []
+    if mass is None or len(ends) < 2 or ends[0] is None or ends[1] is None:
+        return
+    length = ends[1].value - ends[0].value
+    thick = 0.0 if polar is None else _most(polar)
+    if length > 0 and _least(transverse) > _most(mass) * length**2 + thick / 2:
+        most = mass.value * length**2 + (0.0 if polar is None else polar.value / 2)
+        yield ("shaft.transverse_inertia", f"{transverse.value:g} kg m^2",
+               f"at most {most:.4g} kg m^2, which {mass.value:g} kg within {length * 1e3:g} mm can have: look at the units "
+               "of mass, inertias and ends")  # fmt: skip
+
+
+def _number(places: Places, stated: Toleranced | str | None, key: str, unit: str) -> Toleranced | None:
+    """A number above 0 in the unit; None where there is none, or none that can be told."""
+    found = [t.number for t in _terms(places, stated, key)] if stated is not None else []
+    return found[0] if found and found[0].unit == unit and found[0].value > 0 else None
+
+
+def _most(number: Toleranced) -> float:
+    return number.value * (1 + ROUNDED) + AGREE * number.standard_uncertainty
+
+
+def _least(number: Toleranced) -> float:
+    return number.value * (1 - ROUNDED) - AGREE * number.standard_uncertainty
 
 
 def _terms(places: Places, stated: Toleranced | str, key: str) -> tuple[Term, ...]:

@@ -88,6 +88,11 @@ class Places:
         return tuple(name for name, stated in self._stated.items() if stated is not None)
 
     @property
+    def _from(self) -> tuple[str, ...]:
+        """All that a place may count from, each once."""
+        return tuple(dict.fromkeys((ORIGIN, CENTRE, *self.parts)))
+
+    @property
     def directed(self) -> tuple[str, ...]:
         """All that has a direction."""
         return tuple(name for name, stated in self._turned.items() if stated is not None)
@@ -109,7 +114,7 @@ class Places:
             raise PlaceError(f"{_key(through[0], 'at')}.from", found, "a place that does not count from itself")
         stated = self._stated.get(part)
         if stated is None:
-            known = ", ".join((ORIGIN, CENTRE, *self.parts))
+            known = ", ".join(self._from)
             key = f"{_key(through[-1], 'at')}.from" if through else part
             raise PlaceError(key, part, f"a part with a place: one of {known}")
         key = _key(part, "at")
@@ -201,8 +206,8 @@ class Places:
             if identity not in self.known:
                 yield f"spans.{identity}", identity, f"the identity of a number{_near(identity, self.known)}"
             for part in pair:
-                if part not in (ORIGIN, CENTRE, *self.parts):
-                    yield f"spans.{identity}", part, f"one of {', '.join((ORIGIN, CENTRE, *self.parts))}"
+                if part not in self._from:
+                    yield f"spans.{identity}", part, f"one of {', '.join(self._from)}"
 
 
 def _key(part: str, entry: str) -> str:

@@ -60,10 +60,15 @@ def _densities(rig: RigFile) -> Iterator[Problem]:
 def _lengths(rig: RigFile) -> Iterator[Problem]:
     """A length in the wrong unit; what is not positive is another matter."""
     for name, length in rig.geometry.items():
-        low, high = GAP_M if name in GAPS else LENGTH_M
-        if length.unit == "m" and length.value > 0 and not low <= length.value <= high:
-            text = f"{low:g} to {high:g} m; is the unit right?"
+        if beyond := beyond_likely(name, length):
+            text = f"{beyond[0]:g} to {beyond[1]:g} m; is the unit right?"
             yield Problem(str(rig.path), f"geometry.{name}.value", f"{length.value:g} m", text)
+
+
+def beyond_likely(name: str, length: Toleranced) -> tuple[float, float] | None:
+    """The range that a length of [geometry] of this name is beyond; None where it is within it."""
+    low, high = GAP_M if name in GAPS else LENGTH_M
+    return (low, high) if length.unit == "m" and length.value > 0 and not low <= length.value <= high else None
 
 
 def _gain(rig: RigFile, key: str, gain: Toleranced) -> Iterator[Problem]:
