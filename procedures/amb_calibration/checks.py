@@ -41,7 +41,7 @@ def of_signals(data: HangingData, meanings: tuple[signals.Meaning, ...], plan: P
     yield from signals.stuck(table.spread, tuple(table.mean))
     yield from signals.flagged(table.flags, meanings, table.where)
     loaded = {axis.position: axis.coils for axis in pull.axes}
-    yield from signals.settled(table.mean, table.drift, loaded, plan.max_position_m, plan.max_drift_A, table.where)
+    yield from signals.settled(data.held, table.drift, loaded, plan.max_position_m, plan.max_drift_A, table.where)
     yield from _wiring(data)
 
 

@@ -192,9 +192,16 @@ def _share(c: float) -> float:
 
 
 def channels(rig: RigFile) -> tuple[str, ...]:
-    """What is recorded while masses hang, besides the flags: currents and positions of every axis."""
+    """What is recorded while masses hang, besides the flags: currents and positions of every axis, and what other probes
+    read."""
     every = axes(pulls(rig)[0])
-    return (*(coil for a in every for coil in a.coils), *(a.position for a in every))
+    return (*(coil for a in every for coil in a.coils), *(a.position for a in every), *further(rig))
+
+
+def further(rig: RigFile) -> tuple[str, ...]:
+    """Channels of the radial probes beside those that look along the axes."""
+    own = {a.position for a in axes(pulls(rig)[0])}
+    return tuple(p.channel for p in rig.probes.values() if p.direction is not None and p.channel not in own)
 
 
 def axes(pull: Pull) -> tuple[Loaded, ...]:

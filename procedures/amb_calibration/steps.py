@@ -16,8 +16,9 @@ from bench.rigfile import RigFile
 from bench.rigfile.places import CENTRE, Places
 from bench.rigfile.supports import two_planes
 from procedures.amb_calibration.fit import Hangings, hung_shares
+from procedures.amb_calibration.held import held
 from procedures.amb_calibration.plan import Plan
-from procedures.amb_calibration.pulls import Loaded, Pull, channels, pulls
+from procedures.amb_calibration.pulls import Loaded, Pull, channels, further, pulls
 from procedures.servomotor.conventions import displacement
 from procedures.servomotor.loads import load_index
 from procedures.shared.step_table import Labels, StepTable, by_angle, tabulate
@@ -50,12 +51,13 @@ class HangOn(Hang):
 @dataclass(frozen=True)
 class HangingData:
     """`hangings` for the fit, and the `table` (A, P) of their steps; `hung`, the nominal share of a mass at the near and at the
-    far bearing."""
+    far bearing; `held`, by the channels of the loaded axes' probes where the shaft was held (`held.held`)."""
 
     hangings: Hangings
     table: StepTable[Hang]
     masses: tuple[str, ...]
     hung: tuple[float, float]
+    held: dict[str, Array]
 
 
 def read_hangings(recording: Recording[Plan], pull: Pull | None = None) -> HangingData:
@@ -80,7 +82,7 @@ def read_hangings(recording: Recording[Plan], pull: Pull | None = None) -> Hangi
         table.each(lambda hang: hang.angle_rad)[:, 0].copy(),
         pull,
     )
-    return HangingData(hangings, table, masses, hung(rig, pull.hook))
+    return HangingData(hangings, table, masses, hung(rig, pull.hook), held(rig, pull, table.mean, further(rig)))
 
 
 def arrays(
