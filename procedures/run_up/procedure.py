@@ -197,6 +197,7 @@ def evaluate(recording: Recording[Any], findings: Findings) -> Run:
     except AnalysisError as error:  # a drive that was faster than it was told: too few turns for a curve
         findings.end(Finding("no-passage", str(error), passage.name, Effect.ERROR))
     findings.add((bearings.describe(run.known), *find_uncertified(recording.rig), *dwelling.uncaptured(recording.rig)))
+    findings.add(dwelling.left_out(recording.rig))
     findings.add(checks.of_run(run, recording, plan))
     return run
 

@@ -46,6 +46,18 @@ def uncaptured(rig: RigFile) -> Iterator[Finding]:
         yield Finding("telemetry-alone", text)
 
 
+def left_out(rig: RigFile) -> Iterator[Finding]:
+    """Probes beside those of the axes: the balance of forces tells runout where an axis has a probe, and nowhere else."""
+    own = conventions(rig).positions
+    names = [name for name, probe in rig.probes.items() if probe.direction is not None and probe.channel not in own]
+    if names:
+        planes = ", ".join(name for name, probe in rig.probes.items() if probe.channel in own)
+        text = (f"nothing is stated of what {', '.join(names)} read: vectors, orbits, D_max and runout are those of {planes}, "
+                "which look along the bearings' axes. Elsewhere the shaft may move more, beyond both bearings most of all. "
+                "What they read is recorded, runout included.")  # fmt: skip
+        yield Finding("planes-left-out", text, ", ".join(names))
+
+
 def stop(rig: Rig) -> None:
     """Compensate nothing, stop the drive, and leave the shaft standing under the PID."""
     machine = conventions(rig.file)

@@ -101,6 +101,7 @@ def evaluate(recording: Recording[Any], findings: Findings) -> Results:
     findings.gate(bearings.unknown(known, recording.rig))
     results = estimates.results(dwells, recording.rig, known)
     findings.add((bearings.describe(known), *find_uncertified(recording.rig), *dwelling.uncaptured(recording.rig)))
+    findings.add(dwelling.left_out(recording.rig))
     findings.add(of_dwells(listen(recording, results.slow), results.dwells))
     findings.add(checks.of_results(results))
     return results
