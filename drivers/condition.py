@@ -30,6 +30,7 @@ class Condition:
         self._states, self._faults = rig.choices("state"), rig.choices("fault")
         self._speed = told_in(rig, SPEED)
         self._reboots = 0
+        self._raised: tuple[str, int] | None = None  # the fault that `check` raised last, while it stands
         self._code, self._since_ns = 0, 0  # of the state, and since when it is that
         self._unknown_ns: int | None = None  # since when its state has no name, by the frames that came
         self._held = self._asked_down = self._asked_before = False  # it has held the rotor; it was asked to set it down
@@ -54,10 +55,14 @@ class Condition:
             self._code, self._since_ns = code, now_ns
         if not self._asked_down and self.mode in HELD:
             self._held = True
+        if self.fault == "NONE" and self.mode not in ("FAULT", UNKNOWN):
+            self._raised = None  # what comes after that is a fault of its own, also one of the same name
 
     def commanded(self, name: str) -> None:
         """A command is about to be sent."""
         self._asked_before = self._asked_down
+        if name == "CLEAR_FAULT":
+            self._raised = None
         if name in TAKE_HOLD:
             self._held = self._asked_down = False
         elif name in SET_DOWN:
@@ -90,6 +95,19 @@ class Condition:
         name = self._faults.get(code, f"code {code}" if code else "NONE")
         return "NONE" if name in self._binding.no_fault else name
 
+    @property
+    def raised(self) -> bool:
+        """Whether a fault stands that `check` has raised already, and none but that one: who left a step without it has handled
+        it. A restart is raised once and does not stand."""
+        return self._raised is not None and self._raised == self._standing
+
+    @property
+    def _standing(self) -> tuple[str, int]:
+        """What tells a fault from another: its name, or the state where it has none, after so many restarts. A fault keeps its
+        name while the state goes on from lifting to failed."""
+        name = self.fault if self.fault != "NONE" else f"state {int(self._telemetry.latest.get('state', 0))}"
+        return name, self._telemetry.counters.reboots
+
     def check(self) -> None:
         """Raise unless all is well.
 
@@ -108,8 +126,10 @@ class Condition:
             self._held = False
             raise DeviceFault("the controller restarted during the run: its tick began anew; look at its supply")
         if self.fault != "NONE":
+            self._raised = self._standing
             raise DeviceFault(self.fault_text())
         if self.mode == "FAULT" or self._lost_its_name():
+            self._raised = self._standing
             code = int(self._telemetry.latest.get("state", 0))
             name = self._states.get(code, f"{code}, which its DBC does not name")
             raise DeviceFault(f"the controller reports no fault, but its state is {name}: see its documentation")

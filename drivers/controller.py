@@ -118,6 +118,8 @@ class Controller:
     def catch_up(self) -> None:
         """Let the clock run until telemetry has reached the present, so that what is commanded next cannot act on samples
         of the time before: a controller whose clock has fallen behind gets there later. Silence ends a run by itself."""
+        if self.watch.condition.raised:
+            return  # whoever left the step has handled it: only the next poll raises it again, and any other fault at once
         due, waited = self.clock.now_ns() - self.telemetry.period_ns, waiting.Stopwatch(self._base.now_ns)
         while (
             self.telemetry.newest_ns < due
@@ -292,9 +294,5 @@ class Controller:
         self.wait(done, timeout_s, lambda: no_reply(self.link.name, what, timeout_s))
 
     def wait(self, done: Callable[[], bool], timeout_s: float, error: Callable[[], BenchError]) -> None:
-        """Let the clock run until something is true.
-
-        Raises:
-            BenchError: the given one, when time runs out.
-        """
+        """Let the clock run until something is true; raises the given error when time runs out."""
         waiting.until(done, timeout_s, error, self.clock, self._base.now_ns)

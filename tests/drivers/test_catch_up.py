@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 from host_clock import RIG, HostClock
 
-from bench.errors import LinkError
+from bench.errors import DeviceFault, LinkError
 from bench.link.frames import FrameBatch
 from bench.link.session import Session
 from bench.progress import Silent
@@ -85,6 +87,69 @@ def test_a_controller_that_is_too_far_behind_is_not_waited_for_and_the_run_says_
     controller.clock.sleep(0.1)
     controller.catch_up()
     assert controller.cut_ns > 0
+
+
+@contextmanager
+def levitated(path: Path) -> Iterator[tuple[Host, Controller, WatchedSteps]]:
+    """A controller that holds the shaft, recorded; its heartbeats end where `renew_lease` of the host does nothing."""
+    host = Host()
+    controller = Controller(RIG, host, host, Session(1, 1_767_225_600, "test"))
+    header = RunHeader({"run": {}}, {"rig.toml": RIG.toml_text.encode(), "rig.dbc": RIG.dbc_text.encode()})
+    controller.connect()
+    with Recorder(path, clock=controller.clock, streams=[controller.telemetry.layout], header=header) as recorder:
+        controller.recorder = recorder
+        controller.enable()
+        controller.levitate()
+        yield host, controller, WatchedSteps(recorder, Silent(), controller.catch_up)
+
+
+def handled(host: Host, controller: Controller, steps: WatchedSteps) -> None:
+    """A step in which heartbeats are lost, which is handled; telemetry lacks its end."""
+    host.renew_lease = lambda: None
+    with steps.step("lift"):
+        with pytest.raises(DeviceFault, match="HEARTBEAT_LOST"):
+            controller.clock.sleep(3.0)
+        host.stand_still(0.08)
+
+
+def test_a_fault_that_was_handled_in_a_step_is_not_raised_by_leaving_it(tmp_path: Path) -> None:
+    """But by the next poll."""
+    with levitated(tmp_path / "handled.mcap") as (host, controller, steps):
+        handled(host, controller, steps)
+        with pytest.raises(DeviceFault, match="HEARTBEAT_LOST"):
+            controller.clock.sleep(0.1)
+
+
+def test_a_fault_that_comes_within_a_step_or_while_it_is_caught_up_ends_the_run(tmp_path: Path) -> None:
+    for name, within_s, behind_s in (("within", 3.0, 0.0), ("after", 0.1, 3.0)):
+        with levitated(tmp_path / f"{name}.mcap") as (host, controller, steps):
+            host.renew_lease = lambda: None
+            with pytest.raises(DeviceFault, match="HEARTBEAT_LOST"), steps.step("dwell"):
+                controller.clock.sleep(within_s)
+                host.stand_still(behind_s)
+
+
+def test_another_fault_than_the_one_that_was_handled_ends_the_run(tmp_path: Path) -> None:
+    """Also of the same name, once the first was cleared."""
+    with levitated(tmp_path / "again.mcap") as (host, controller, steps):
+        handled(host, controller, steps)
+        host.renew_lease = host.machine.link.renew_lease
+        controller.guarded = False
+        controller.clock.sleep(5.0)  # it lands
+        controller.reach("CLEAR_FAULT", "OFF", 1.0)
+        controller.guarded = True
+        controller.enable()
+        controller.levitate()
+        host.renew_lease = lambda: None
+        with pytest.raises(DeviceFault, match="HEARTBEAT_LOST"), steps.step("dwell"):
+            controller.clock.sleep(0.1)
+            host.stand_still(3.0)
+    with levitated(tmp_path / "other.mcap") as (host, controller, steps):
+        handled(host, controller, steps)
+        controller.telemetry.latest["fault"] = 1
+        assert controller.fault not in ("NONE", "HEARTBEAT_LOST")
+        with pytest.raises(DeviceFault), steps.step("dwell"):
+            host.stand_still(0.08)
 
 
 def test_a_bench_that_stood_still_does_not_take_the_controller_for_dead() -> None:
