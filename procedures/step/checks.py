@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from procedures.shared import signals
 from procedures.step.estimates import Result
 from procedures.step.plan import Plan
 from procedures.step.steps import STEP, Case, Done
+from procedures.step.untold import Why
 
 FATAL = (
     "current-sign",
@@ -212,10 +214,10 @@ def of_results(
     plan: Plan,
     *,
     leaning: bool = False,
-    torn: Container[str] = (),
+    untold: Mapping[str, Why] = MappingProxyType({}),
 ) -> Iterator[Finding]:
-    """Steps that do not settle, bands that noise has widened, responses without an oscillation; `torn`: groups of steps in
-    which one of two hardly swings."""
+    """Steps that do not settle, bands that noise has widened, responses without an oscillation; `untold`: why groups of steps
+    tell no damping although there is one (those whose fits go astray: `untold.find_untold`)."""
     for case, result in results.items():
         if result.settled.open:
             yield Finding("not-settled", f"the position runs along the edge of the band ({result.settled.within:.1%}), so that "
@@ -239,13 +241,13 @@ def of_results(
                 "bandwidth, damping and frequency are not told; rise and error are."
             )
             yield Finding("axes-oblique", text, where)
-        elif where in torn:
+        elif untold.get(where) is Why.TORN:
             text = (
                 "two oscillations share the response, and one of them is damped so heavily that it hardly swings, as where one "
                 "bearing holds the shaft much more softly: damping and frequency of their mean are not told."
             )
             yield Finding("oscillations-unlike", text, where)
-        elif "damping" not in estimates:
+        elif "damping" not in estimates and where not in untold:
             yield Finding("no-oscillation", "no oscillation that dies away fits the response: damping and frequency are not "
                           "told.", where)  # fmt: skip
 

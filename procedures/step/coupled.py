@@ -38,6 +38,7 @@ SCALE = 100.0  # 1/s, of the search
 ALIKE = 0.3
 WEIGHS = math.log(2.0)  # of the logarithm of r where nothing is stated: from half to twice for two shafts of three
 DAMPED = 0.2  # where a search begins that has nothing better
+ALONE = 3  # of what is searched, for one oscillation
 KNOWN = 3  # rows of what is known: both parts of d, and r
 ASKED = 16.0  # of chi-squared, that two terms in t² of what fades have to explain: noise alone does once in 3000
 # Damping from which it is open whether a pole counts as an oscillation (`oscillation.HARD`), and by how much of itself the mean
@@ -116,7 +117,7 @@ class _Data:
 
     def swing(self, x: Array) -> Swing:
         """Of what was found, with its best linear terms."""
-        if len(x) == 3:
+        if len(x) == ALONE:
             level, fades, real, imag = map(float, _solved(self._one(x), self.seen[:, 0]))
             poles, parts = np.array([SCALE * complex(-x[0], x[1])]), np.array([complex(real, imag)])
             apart = 0.0
@@ -146,15 +147,22 @@ def _modes(x: Array) -> tuple[Complex, Complex]:
 
 
 def _solved(a: Array, seen: Array) -> Array:
-    """Best linear terms; of many rows by their squares."""
-    return np.asarray(np.linalg.lstsq(a.T @ a, a.T @ seen, rcond=None)[0])
+    """Best linear terms; of many rows by their squares.
+
+    Raises:
+        FloatingPointError: rates so great that the squares are no numbers, which LAPACK would print about, and go on.
+    """
+    squares, products = a.T @ a, a.T @ seen
+    if not (np.isfinite(squares).all() and np.isfinite(products).all()):
+        raise FloatingPointError("the search went astray")
+    return np.asarray(np.linalg.lstsq(squares, products, rcond=None)[0])
 
 
 def hardly_swings(swing: Swing) -> bool:
     """Whether one of two oscillations beside what fades is so heavily damped that it is open whether it counts, and their mean
     pole depends on that."""
     damping = -swing.poles.real / np.abs(swing.poles)
-    return bool(swing.doubts) and bool((damping > NEARLY).any()) and swing.torn > TORN
+    return len(swing.found) > ALONE and bool((damping > NEARLY).any()) and swing.torn > TORN
 
 
 def fitted(steps: Sequence[One], constant: float, start: Swing | None = None, tilting: Tilting = ANY) -> Swing:
@@ -194,7 +202,7 @@ def _by_what_fades(data: _Data, alike: Swing) -> Swing:
 def _searched(data: _Data, x0: Array) -> Swing:
     from scipy import optimize
 
-    of = data.alone if len(x0) == 3 else data.both
+    of = data.alone if len(x0) == ALONE else data.both
     with np.errstate(over="raise", invalid="raise"):
         try:
             found = optimize.least_squares(of, x0, x_scale=0.1, method="lm", ftol=TOLD, xtol=TOLD, max_nfev=300)
@@ -205,12 +213,17 @@ def _searched(data: _Data, x0: Array) -> Swing:
     return replace(out, misfit=misfit, found=tuple(found.x), doubts=_doubts(data, found.x, found.jac))
 
 
-def _doubts(data: _Data, x: Array, slopes: Array) -> tuple[Swing, ...]:
-    """The fit were what is known off by its standard uncertainty, one thing after the other: x + (J'J)^-1 J_k' noise."""
-    if len(x) == 3:
+def _doubts(data: _Data, x: Array, slopes: Array) -> tuple[Swing, ...] | None:
+    """The fit were what is known off by its standard uncertainty, one thing after the other: x + (J'J)^-1 J_k' noise.
+    None where that goes astray: straight on from a fit that hardly tells a second oscillation, rates grow beyond numbers."""
+    if len(x) == ALONE:
         return ()
-    moved = np.linalg.pinv(slopes.T @ slopes) @ slopes[-KNOWN:].T * data.noise
-    return tuple(data.swing(x + by) for by in moved.T)
+    with np.errstate(over="raise", invalid="raise"):
+        try:
+            moved = np.linalg.pinv(slopes.T @ slopes) @ slopes[-KNOWN:].T * data.noise
+            return tuple(data.swing(x + by) for by in moved.T)
+        except (FloatingPointError, OverflowError, np.linalg.LinAlgError):
+            return None
 
 
 def _data(steps: Sequence[One], constant: float, tilting: Tilting) -> _Data:

@@ -199,8 +199,8 @@ def _oscillation(group: str, results: Sequence[Result], rig: RigFile, start: flo
     kinds, n = [(r.case, o.begin) for r in results for o in r.ones], len(ones)
     try:
         whole = swing(ones, tilting=tilting)
-        if hardly_swings(whole):
-            return {}
+        if hardly_swings(whole) or whole.doubts is None or not all(np.isfinite(s.pole) for s in whole.doubts):
+            return {}  # `untold` says which
         left = [swing(ones[:k] + ones[k + 1 :], whole, tilting) for k in range(n)]
     except AnalysisError:
         return {}
@@ -237,17 +237,9 @@ def _oscillation(group: str, results: Sequence[Result], rig: RigFile, start: flo
     return out
 
 
-def groups_torn(results: Mapping[Case, Result], groups: Mapping[str, Mapping[str, Estimate]], rig: RigFile) -> set[str]:
-    """Those of `groups` that tell no damping, since one of two oscillations hardly swings."""
-    out = set()
-    for group in (name for name, told in groups.items() if "damping" not in told):
-        of = [r for c, r in results.items() if c.group == group and not leans(rig, c.axis)]
-        try:
-            if of and hardly_swings(swing([o for r in of for o in r.ones], tilting=tilting_of(rig))):
-                out.add(group)
-        except AnalysisError:
-            continue
-    return out
+def one_group(group: str, results: Mapping[Case, Result], rig: RigFile) -> list[One]:
+    """All steps of a setting, an axis and a speed; none where y and z share two oscillations."""
+    return [o for c, r in results.items() if c.group == group and not leans(rig, c.axis) for o in r.ones]
 
 
 def _first_order(results: Sequence[Result]) -> float:

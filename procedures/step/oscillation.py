@@ -31,7 +31,7 @@ class Swing:
     e^(poles t), t s from the control's answer; `misfit` rms. Where nothing fades fast `constant` is 0; `unlike`: two things
     fade with constants that are not alike, hence `apart`. `found`: where a search for nearly the same begins; `doubts`: what it
     would be, were what was taken for granted of a second oscillation off by its standard uncertainty, one thing after the other
-    (`coupled`)."""
+    (`coupled`); None where that cannot be told."""
 
     poles: Complex
     parts: Complex
@@ -43,7 +43,7 @@ class Swing:
     apart: float = 0.0
     unlike: bool = False
     found: tuple[float, ...] = ()
-    doubts: tuple[Swing, ...] = ()
+    doubts: tuple[Swing, ...] | None = ()
 
     @property
     def pole(self) -> complex:

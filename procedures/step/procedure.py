@@ -175,7 +175,7 @@ class Results:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     """The response of each case, and what the cases of an axis have in common."""
-    from procedures.step import checks, estimates, hum, planes, slewing
+    from procedures.step import checks, estimates, hum, planes, slewing, untold
 
     before = list(checks.before(recording))
     findings.gate(before)
@@ -186,8 +186,9 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     by_case = estimates.by_case(steps, recording.rig, plan.band)
     by_group = estimates.by_group(steps, by_case, recording.rig)
     findings.add(frame.describe(recording.rig, plan.axes))
-    leaning, torn = leans(recording.rig), estimates.groups_torn(by_case, by_group, recording.rig)
-    findings.add(checks.of_results(by_case, by_group, plan, leaning=leaning, torn=torn))
+    why = untold.groups(by_case, by_group, recording.rig)
+    findings.add(checks.of_results(by_case, by_group, plan, leaning=leans(recording.rig), untold=why))
+    findings.add(untold.find_untold(by_case, by_group, why, recording.rig))
     findings.add(slewing.of_sizes(by_case))
     findings.add(slewing.of_starts(steps))
     findings.add(hum.find_hum(steps, by_case))
