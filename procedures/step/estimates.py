@@ -22,14 +22,12 @@ from procedures.step.coupled import Tilting, hardly_swings
 from procedures.step.fit import swing
 from procedures.step.oscillation import One, Swing
 from procedures.step.position import leans, shares, tilting_of
+from procedures.step.rising import rises
 from procedures.step.scatter import jackknifed, left_out, pooled, repeated, weighed
 from procedures.step.settling import Curve, Settling
 from procedures.step.steps import Case, Done
 
 Array = npt.NDArray[np.float64]
-# Of a period: what the spline leaves of a crossing, over all phases of the step in its period; from SMOOTH samples in a rise
-# on it falls as their cube, since the spline is one of third order (0.004 at 5.1 samples without noise, 0.006 at 4.4).
-RISE_SHARE, SMOOTH = 0.012, 3.6
 # Of the bandwidth b: what the sampling rate r folds onto it from r - b. From a tenth of r - b on it falls as the cube of
 # b/(r - b): response and mean together lose three orders there (0.0007 at 0.061 without noise, 0.001 at 0.07).
 ALIAS, FOLDED = 3e-3, 0.1
@@ -64,8 +62,9 @@ def by_case(steps: list[Done], rig: RigFile, band: float) -> dict[Case, Result]:
     done, tilting = step_steps.by_case(steps), tilting_of(rig)
     ones = {case: tuple(_one(d) for d in d_all) for case, d_all in done.items()}
     fits = {case: [] if leans(rig, case.axis) else _fits(o, tilting) for case, o in ones.items()}
+    rising, left = rises(ones, {case.group for case, of in done.items() if of[0].late_s})
     seen = {
-        "rise_time": repeated("s", 1, ones, _rise),
+        "rise_time": rising,
         "steady_error": repeated("m", 0, ones, lambda case, o: case.way * case.size * (_late(o) - 1)),
         "overshoot": jackknifed("1", fits, ones, lambda s, _: s.peak - 1),
         "bandwidth": jackknifed("Hz", fits, ones, lambda s, o: response.bandwidth(o, s)),
@@ -80,8 +79,7 @@ def by_case(steps: list[Done], rig: RigFile, band: float) -> dict[Case, Result]:
             if (lag := lag_estimate(rig)) is not None:
                 found["settling_time"] += lag
         period = float(all_of[0].t[1] - all_of[0].t[0])
-        left = spline_left(found["rise_time"].value, period)
-        found["rise_time"] += bound(f"sampling/rise/{case.where}", "sampling", left, "s")
+        found["rise_time"] += bound(f"sampling/rise/{case.where}", "sampling", left[case], "s")
         found["steady_error"] += _gained(case, rig)
         other = seen["overshoot"].values.get(replace(case, way=-case.way))
         if "overshoot" in found and other is not None:
@@ -93,11 +91,6 @@ def by_case(steps: list[Done], rig: RigFile, band: float) -> dict[Case, Result]:
         error = float(np.mean([_late(o) - 1 for o in ones[case]]))
         out[case] = Result(case, ones[case], fits[case][0] if fits[case] else None, settled, error, found)
     return out
-
-
-def spline_left(rise: float, period: float) -> float:
-    """Half width of what the spline leaves of a rise in s, from means over `period` s."""
-    return RISE_SHARE * period * min(1.0, (SMOOTH * period / rise) ** 3)
 
 
 def aliased(bandwidth: float, period: float) -> float:
@@ -117,14 +110,6 @@ def harmonic_left(difference: float, swing: Swing) -> float:
 
 def _one(d: Done) -> One:
     return One(d.t, np.array([d.y, d.tilt]) / d.case.size, d.case.size, d.begin)
-
-
-def _rise(case: Case, o: One) -> float:
-    early = o.t < 0.05
-    try:
-        return response.rise_time(o.t[early], o.both[0, early])
-    except AnalysisError as error:
-        raise AnalysisError(f"{case.where}: {error}") from error
 
 
 def _late(o: One) -> float:

@@ -34,13 +34,26 @@ def curve(t: Array, y: Array) -> tuple[Array, Array]:
     return fine, np.asarray(interpolate.make_interp_spline(edges, total, 3).derivative()(fine))
 
 
-def rise_time(t: Array, y: Array) -> float:
-    """From 10 to 90 % of a step of one.
+def curve_from_rest(t: Array, y: Array) -> tuple[Array, Array]:
+    """The same from t = 0 on, until which what `y` (n,) are the means of rested; a reading that ends nearer than half a period
+    behind it tells more noise than curve."""
+    from scipy import interpolate
+
+    period = float(t[1] - t[0])
+    late = t > period / 2
+    edges = np.concatenate(([0.0], t[late]))
+    total = np.concatenate(([0.0], (np.cumsum(y) - y[t <= -period / 2].sum())[late] * period))
+    fine = np.linspace(0.0, edges[-1], FINE * len(edges) + 1)
+    spline = interpolate.make_interp_spline(edges, total, 3, bc_type=([(1, 0.0)], [(2, 0.0)]))
+    return fine, np.asarray(spline.derivative()(fine))
+
+
+def rise_time(fine: Array, x: Array) -> float:
+    """From 10 to 90 % of a step of one, of a curve `x` (n,) at equally spaced `fine`.
 
     Raises:
         AnalysisError: it does not get there.
     """
-    fine, x = curve(t, y)
     above = np.flatnonzero(x >= 0.9)
     if not len(above):
         raise AnalysisError(f"the position reaches {x.max():.0%} of the step; expected 90 % at least")

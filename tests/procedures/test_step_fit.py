@@ -153,7 +153,7 @@ def test_when_a_set_point_acted_is_told_finer_than_the_telemetry(begun: float) -
 
 def test_a_position_that_does_not_get_there_is_told() -> None:
     with pytest.raises(AnalysisError, match="90 %"):
-        response.rise_time(np.arange(50) * 1e-3, np.full(50, 0.3))
+        response.rise_time(*response.curve(np.arange(50) * 1e-3, np.full(50, 0.3)))
 
 
 def test_the_scatter_of_a_fit_that_large_steps_carry() -> None:
