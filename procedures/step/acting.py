@@ -20,7 +20,8 @@ START_S = 4e-5
 """How well the control currents tell when the set points of a case acted: the mean of its steps, on 12 drawn machines of three
 rigs, 38 µs early to 29 µs late (noise, and what `onset.LATE_S` leaves of the rotor's answer)."""
 UNLIKE = 0.03
-"""Of the jump: on drawn machines of three rigs 0.005 at most; 0.05 to 0.25 where the derivative pushes."""
+"""Of the jump: on drawn machines of three rigs 0.005 at most; 0.05 to 0.25 where the derivative pushes, and 0.10 to 0.19 on an
+overhung rotor whose light end has turned its bearing's current round after two samples (1 kHz)."""
 GONE = 0.25  # of the way: until then the currents push
 ANSWER = 0.25  # of the greatest change of the control current: where it first gets there, the step began
 SURELY_S, PLAIN, FEWEST = 5e-3, 8.0, 25  # before a quarter of the way; standard deviations; samples that tell them

@@ -49,6 +49,7 @@ def of_starts(steps: list[Done]) -> Iterator[Finding]:
         share = unlike(of)
         if share > UNLIKE:
             text = (f"the control currents answer the set point otherwise than a jump, by {share:.0%} of it: the law pushes as "
-                    "the set point goes, as one does that differentiates its error. When a step begins is known to "
-                    f"±{of[0].start_s * 1e3:.2g} ms, and so are settling times.")  # fmt: skip
+                    "the set point goes, as one does that differentiates its error, or the shaft turns the currents round "
+                    "within the few samples by which a jump is known, as a light end does; faster telemetry would show which. "
+                    f"When a step begins is known to ±{of[0].start_s * 1e3:.2g} ms, and so are settling times.")  # fmt: skip
             yield Finding("start-unclear", text, group)
