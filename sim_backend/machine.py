@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
+from bench.errors import Problem
 from bench.link.fault_injection import Fault
 from bench.rigfile import RigFile
 from bench.rigfile.toleranced import Toleranced
@@ -93,6 +94,7 @@ class Machine:
         columns: of a machine whose rows are channels of the rig file, their names there; `channels` and `places` say nothing
             then.
         motions: what it truly does under a plan.
+        unknown: keys of `[simulation]` that it never asks for; of a machine that tells them.
         tick_s, period_s: of its controller, and from sample to sample of its telemetry.
         states: its controller's states in the place of `sim_backend.controller.states.States`, of plant, machine, the
             controller's own parameters, the owner and a planted fault's time.
@@ -123,6 +125,7 @@ class Machine:
     columns: Callable[[RigFile], tuple[str, ...]] | None = None
     controls: frozenset[str] = frozenset()
     motions: Motions = NONE
+    unknown: Callable[[RigFile], Iterable[Problem]] = lambda _: ()
     levitates: bool = True
     states: Callable[..., Any] | None = None
     tick_s: float = TICK_S

@@ -12,12 +12,13 @@ from bench.rigfile.messages import MessageMap, load_messages
 from sim_backend.controller.controls import without_control
 from sim_backend.controller.meanings import FAULTS
 from sim_backend.machine import Machine
-from sim_backend.spoken import own_words, tellable, told_as
+from sim_backend.spoken import own_words, stated_readings, tellable, told_as
 
 
 def unspoken(rig: RigFile, machine: Machine) -> Iterator[Problem]:
-    """Channels that the machine has no reading for, a tick or period that is not its own, faults that nobody knows. A binding
-    that leads nowhere is told by `bench.rigfile.check`."""
+    """Keys that the machine does not know, channels that it has no reading for, a tick or period that is not its own, faults
+    that nobody knows. A binding that leads nowhere is told by `bench.rigfile.check`."""
+    yield from machine.unknown(rig)
     try:
         messages = load_messages(rig.dbc_text, classic=rig.link.classic)
     except ConfigError:  # told by whoever reads the rig file
@@ -27,7 +28,12 @@ def unspoken(rig: RigFile, machine: Machine) -> Iterator[Problem]:
     known = tellable(rig, machine)
     lacking = [name for name in rig.channels if told_as(rig, name, known) is None]
     free = ", ".join(sorted(known - {told_as(rig, n, known) for n in rig.channels}))
+    stated = stated_readings(rig)
     for name in lacking:
+        if name in stated:
+            expected = f"a reading of the simulated {machine.name}, one of {free}"
+            yield Problem(rig.path, f"simulation.readings.{name}", repr(stated[name]), expected)
+            continue
         found = f"what the simulated {machine.name} has no reading for"
         expected = f'`{name} = "READING"` under [simulation.readings], with one of {free}; or a run with --backend live'
         if _unread(rig, name):

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import difflib
 import textwrap
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
+from functools import partial
 
 from bench import catalogue
+from bench.cli.broken import forgiven
 from bench.cli.loading import beside, load_procedure, of_entry, requires_of
 from bench.errors import ConfigError, Lacking, Problem
 from bench.procedure import BenchPlan, Procedure
@@ -18,6 +20,7 @@ from bench.rigfile import RigFile
 from bench.rigfile.envelope import Envelope
 
 WIDTH = 80
+UNTOLD = "it cannot be told until the problems of the rig file are mended"
 NAMED = 3  # names of a table, where all procedures are listed
 
 
@@ -36,18 +39,27 @@ class Ability:
         return not self.lacking and not self.unfit and not self.problems
 
 
-def abilities(rig: RigFile, only: str = "") -> list[Ability]:
+def abilities(rig: RigFile, only: str = "", *, wrong: bool = False) -> list[Ability]:
     """Of every procedure of the catalogue, or of one, by its name or its file. Where all are asked for, one of a package that
-    cannot be used is told like one that the rig cannot run.
+    cannot be used is told like one that the rig cannot run. `wrong`: problems of the rig file are told already, and what a
+    procedure trips over follows from them.
 
     Raises:
         ConfigError: there is no such procedure, or the one that is asked for cannot be used.
     """
     if only:
-        return [_ability(rig, load_procedure(only))]
+        asked = load_procedure(only)
+        return [_as_far(wrong, asked.name, partial(_ability, rig, asked))]
     twice, stated = dict(catalogue.taken_twice()), _stated(rig)
-    able = [_of_entry(rig, entry, stated) for entry in catalogue.procedures() if entry.name not in twice]
+    entries = [entry for entry in catalogue.procedures() if entry.name not in twice]
+    able = [_as_far(wrong, entry.name, partial(_of_entry, rig, entry, stated)) for entry in entries]
     return [*able, *(Ability(name, unfit=(why,)) for name, why in twice.items())]
+
+
+def _as_far(wrong: bool, procedure: str, look: Callable[[], Ability]) -> Ability:
+    with forgiven(wrong):
+        return look()
+    return Ability(procedure, unfit=(UNTOLD,))
 
 
 def _of_entry(rig: RigFile, entry: catalogue.Entry, stated: Collection[str]) -> Ability:

@@ -118,9 +118,14 @@ def check_rig_file(rig: str, procedure: str = "") -> int:
     problems, load = check_rig(rig)
     file, able = as_far_as_read(rig), list[Ability]()
     if file is not None:
-        able = abilities(file, procedure)
+        able = abilities(file, procedure, wrong=bool(problems))
         of_procedures = dict.fromkeys(p for a in able for p in a.problems)  # a spec that cannot be read is each one's
-        of_files = (*_of_spec(file.name), *of_procedures, *_of_simulation(file), *_of_calibrations(file))
+        of_files = (
+            *_of_spec(file.name),
+            *of_procedures,
+            *_of_simulation(file, wrong=bool(problems)),
+            *_of_calibrations(file),
+        )
         problems += read_merged(path).attributed((*unknown_plans(file), *of_files))
     for problem in problems:
         sys.stderr.write(f"{problem}\n")
@@ -180,12 +185,18 @@ def _of_spec(rig: str) -> Iterator[Problem]:
         yield from misnamed(rig)
 
 
-def _of_simulation(rig: RigFile) -> Iterator[Problem]:
-    """What the simulated backend would object to, where the rig file has something to simulate."""
-    from bench.errors import ConfigError, Problem
+def _of_simulation(rig: RigFile, *, wrong: bool) -> Iterator[Problem]:
+    """What the simulated backend would object to, where the rig file has something to simulate; of one that is `wrong`, as far
+    as a machine can be made of it."""
+    from bench.cli.broken import forgiven
 
-    if not rig.simulation:
-        return
+    if rig.simulation:
+        with forgiven(wrong):
+            yield from _of_machine(rig)
+
+
+def _of_machine(rig: RigFile) -> Iterator[Problem]:
+    from bench.errors import ConfigError, Problem
     from sim_backend.machines.table import machine_of
     from sim_backend.unspoken import unspoken
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 from bench import units
 from bench.errors import ConfigError, Problem
-from bench.rigfile import busload, check_protection, linkurl
+from bench.rigfile import busload, check_protection, check_seen, linkurl
 from bench.rigfile.beyond import beyond
 from bench.rigfile.busload import BusLoad, bus_load
 from bench.rigfile.check_binding import find, fits, signal_at
@@ -78,6 +78,7 @@ def problems_of(rig: RigFile) -> list[Problem]:
         *check_protection.problems_of(rig),
         *_parameters(rig),
         *impossible(rig),
+        *(Problem(rig.path, *line) for line in check_seen.problems_of(rig)),
         *((*problems_of_machine(rig), *problems_of_capabilities(rig)) if rig.written_in > 1 else ()),
     ]
     controller = rig.devices.get("controller")
@@ -203,7 +204,8 @@ def _bindings(rig: RigFile, messages: MessageMap) -> Iterator[Problem]:
     captures = problems_of_capture(rig.capture, messages, blocks=blocks) if rig.capture is not None else ()
     spoken = problems_of_commandline(rig, messages)
     for key, found, expected in (
-        *problems_of_binding(rig, messages), *problems_of_states(rig, messages), *captures, *spoken
+        *problems_of_binding(rig, messages), *problems_of_states(rig, messages), *captures, *spoken,
+        *check_seen.beyond_signals(rig, messages),
     ):  # fmt: skip
         yield Problem(rig.path, key, found, expected)
 

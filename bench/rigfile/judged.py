@@ -82,7 +82,7 @@ def voltages(rig: RigFile) -> Judged | None:
 
 def ranges(rig: RigFile) -> Judged | None:
     """Whether a probe reads what its signal can just hold, or what the DBC states as its range."""
-    ends = {p.channel: _ends(rig, p.channel) for p in rig.probes.values() if p.channel in rig.channels}
+    ends = {p.channel: _ends(rig, p.channel) for p in rig.probes.values() if _told(rig, p.channel)}
     if not ends:
         return None
     return Judged(tuple(ends), lambda x: _any((x[c] <= low) | (x[c] >= high) for c, (low, high) in ends.items()))
@@ -90,6 +90,15 @@ def ranges(rig: RigFile) -> Judged | None:
 
 def _any(of: Iterator[Shown]) -> Shown:
     return np.asarray(np.logical_or.reduce(list(of)), np.bool_)
+
+
+def _told(rig: RigFile, channel: str) -> bool:
+    """Whether a channel is there and its signal too, in a unit that is known: what leads nowhere is told by the check."""
+    if channel not in rig.channels:
+        return False
+    message, _, name = rig.channels[channel].signal.partition(".")
+    signals = rig.messages.messages[message].signals if message in rig.messages.messages else ()
+    return any(s.name == name and s.unit in units.UNITS for s in signals)
 
 
 def _ends(rig: RigFile, channel: str) -> tuple[float, float]:

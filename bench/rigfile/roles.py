@@ -7,7 +7,8 @@ makes of their samples what was asked for.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from enum import IntFlag
 from typing import Any
 
@@ -189,9 +190,7 @@ def _contact(rig: RigFile, ring: str) -> Status:
     if ring in rig.rings and rig.rings[ring].kind == "axial":
         return Status.CONTACT_AXIAL
     places = Places(rig)
-    radial = sorted(
-        (places.place(f"bearings/{name}").value, name) for name, b in rig.bearings.items() if b.kind == "radial"
-    )
+    radial = sorted(_radial(rig, places))
     names = [name for _, name in radial]
     if ring in names:
         return Status.CONTACT_NEAR if names.index(ring) == 0 else Status.CONTACT_FAR
@@ -201,6 +200,14 @@ def _contact(rig: RigFile, ring: str) -> Status:
         return Status.CONTACT_NEAR
     nearest = min(range(len(radial)), key=lambda k: abs(radial[k][0] - at), default=0)
     return Status.CONTACT_NEAR if nearest == 0 else Status.CONTACT_FAR
+
+
+def _radial(rig: RigFile, places: Places) -> Iterator[tuple[float, str]]:
+    """Place and name of each radial bearing whose place can be told."""
+    for name, bearing in rig.bearings.items():
+        if bearing.kind == "radial":
+            with suppress(PlaceError):
+                yield places.place(f"bearings/{name}").value, name
 
 
 def _channels(rig: RigFile, name: str) -> tuple[str, ...]:

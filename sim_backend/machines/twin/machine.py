@@ -15,6 +15,7 @@ from bench.rigfile import RigFile, protection
 from bench.rigfile.supports import once_per_rig
 from bench.rigfile.toleranced import Toleranced
 from sim_backend.machine import Machine, Truth
+from sim_backend.machines.twin.keys import unknown
 from sim_backend.machines.twin.layout import Numbers, layout_of
 from sim_backend.machines.twin.motions import MOTIONS
 from sim_backend.machines.twin.nominal import nominal_of
@@ -54,6 +55,7 @@ def twin(rig: RigFile) -> Machine:
         places=partial(places, rig), spoil=spoil, supply_V=nominal.set("supply_V", 48.0), windings=windings_of(rig),
         copper_W=copper_W,
         operator=operator, traced=partial(traced, rig), daily=DAILY, columns=columns, motions=MOTIONS,
+        unknown=unknown,
     )  # fmt: skip
 
 
@@ -87,10 +89,15 @@ def _integral_gains(rig: RigFile) -> frozenset[str]:
 
 def windings_of(rig: RigFile) -> dict[str, float]:
     """Temperatures that channels tell or registers of a thermal monitor, all the same."""
-    told = [name for name, c in rig.channels.items() if units.UNITS[c.unit].si == "K"]
+    told = [name for name, c in rig.channels.items() if _in_kelvin(c.unit)]
     devices = [d for d in rig.devices.values() if "thermal" in d.roles]
-    read = [name for d in devices for name, r in d.registers.items() if units.UNITS[r.unit].si == "K"]
+    read = [name for d in devices for name, r in d.registers.items() if _in_kelvin(r.unit)]
     return {name: 0.0 for name in (*told, *read) if name != "ambient"}
+
+
+def _in_kelvin(unit: str) -> bool:
+    """Whether it is of a temperature; one that nobody knows is told by the check of the rig file."""
+    return unit in units.UNITS and units.UNITS[unit].si == "K"
 
 
 def make(p: TwinParams, seed: int, substeps: int) -> TwinPlant:
