@@ -40,6 +40,7 @@ from bench.errors import (
     StopAsked,
 )
 from bench.findings import Effect, Finding
+from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.procedure.states import transition
 from bench.progress import Progress
@@ -139,12 +140,12 @@ def _moved(
                 progress.found(lambda: (*live.findings, *of_calibrations(recorder.calibrations)))
                 transition(rig, RigState.READY)
                 rig.levitation.write(procedure.settings(job.rig, job.plan))
-                transition(rig, procedure.state)
-                up = True
-                progress.stage("acquire")
-                progress.total(_steps_to_do(job))
-                steps = WatchedSteps(recorder, progress, live.catch_up, lambda: rig.health().findings())
-                procedure.acquire(rig, job.plan, cast(Recorder, steps))
+                up = _brought_up(job, rig, recorder)
+                if up:
+                    progress.stage("acquire")
+                    progress.total(_steps_to_do(job))
+                    steps = WatchedSteps(recorder, progress, live.catch_up, lambda: rig.health().findings())
+                    procedure.acquire(rig, job.plan, cast(Recorder, steps))
         except BaseException as error:
             # Whatever it is, also SystemExit: the machine is made safe first.
             cause = error
@@ -156,6 +157,14 @@ def _moved(
             known = None if cause is None else cause_of(cause)[1].code
             findings += tuple(f for f in live.aftermath() if f.code != known)
     return cause, findings, up
+
+
+def _brought_up(job: Job, rig: Rig, recorder: Recorder) -> bool:
+    """Bring the rig from READY into the procedure's state; False where the procedure saw that it must not, or was not."""
+    if job.procedure.bring_up is not None:
+        return job.procedure.bring_up(rig, recorder)
+    transition(rig, job.procedure.state)
+    return True
 
 
 def _steps_to_do(job: Job) -> int:

@@ -29,8 +29,9 @@ from procedures.amb_calibration.plan import FEWEST_MASSES, Plan
 from procedures.amb_calibration.pulls import Loaded, Pull, pulls
 from procedures.amb_calibration.requires import requires
 from procedures.amb_calibration.steps import Hang, HangingData, hung, read_hangings
+from procedures.amb_rotor import before_lift
 from procedures.servomotor.loads import check_masses
-from procedures.shared import assumptions, continued
+from procedures.shared import assumptions, continued, first_look
 from procedures.shared.default_masses import by_weight
 from procedures.shared.weight import weight
 
@@ -93,6 +94,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> list[Analysis]:
     from procedures.amb_calibration import checks
 
     rig, found = recording.rig, pulls(recording.rig)
+    first_look.gate(recording, findings, ())
     findings.gate(checks.of_first(recording, found, {pull.hook: hung(rig, pull.hook) for pull in found}))
     findings.add(turns.findings(recording))
     return [_evaluated(recording, findings, pull, len(found) > 1) for pull in found]
@@ -248,6 +250,7 @@ procedure = Procedure(
     requires=requires,
     check=check,
     settings=settings,
+    bring_up=before_lift.lifted,
     step_count=step_count,
     facts=facts,
     holds_for=lambda plan: {"bias_A": plan.bias_A, "angles": plan.angles},

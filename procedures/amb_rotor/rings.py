@@ -198,16 +198,19 @@ def before(recording: Recording[Any]) -> list[Finding]:
     for step in recording.steps(REST):
         found += of_readings({name: step.mean(name) for name in stations(rig).channels}, rig)
     for event, step in zip(recording.events(LIFT_LOST), recording.steps(LIFT), strict=False):
-        found.append(_of_lift(step, str(event["fault"]), rig))
+        machine = conventions(rig)
+        data = step.read(*machine.positions, *machine.currents) if machine.probed else {}
+        found.append(of_lift(data, recording_period(step), str(event["fault"]), rig))
     return found
 
 
-def _of_lift(step: Step, fault: str, rig: RigFile) -> Finding:
-    """Which exchange of readings explains where the shaft lies at the end of a lift that failed."""
+def of_lift(data: Mapping[str, Array], period_s: float, fault: str, rig: RigFile) -> Finding:
+    """Which exchange of readings explains where the shaft lies at the end of a lift that failed; `data` are positions and
+    currents in it, (n,) SI, empty where none came."""
     machine = conventions(rig)
     text = f"the shaft was lost in the lift ({fault})"
-    if machine.probed and (known := pressed.known(rig)) is not None:
-        found = _exchanged(step, text, rig, machine, known)
+    if machine.probed and data and (known := pressed.known(rig)) is not None:
+        found = _exchanged(data, period_s, text, machine, known)
         return found or Finding(
             "lift-lost",
             f"{text}; where it lies points to no exchange of probes{carrying.added(rig)}.",
@@ -220,12 +223,13 @@ def _of_lift(step: Step, fault: str, rig: RigFile) -> Finding:
     )  # fmt: skip
 
 
-def _exchanged(step: Step, text: str, rig: RigFile, machine: AmbRotor, known: pressed.Known) -> Finding | None:
+def _exchanged(
+    data: Mapping[str, Array], period_s: float, text: str, machine: AmbRotor, known: pressed.Known
+) -> Finding | None:
     """The finding that names the exchange, if one does."""
-    data = step.read(*machine.positions, *machine.currents)
     pairs = [machine.pair(axis) for axis in machine.axes]
     tries = np.all([data[p] + data[n] > CARRIES_A for p, n in pairs], axis=0)
-    last = np.flatnonzero(tries)[-round(PRESSED_S / recording_period(step)) :]
+    last = np.flatnonzero(tries)[-round(PRESSED_S / period_s) :]
     if len(last):
         read = np.array([data[name][last].mean() for name in machine.positions])
         p, n = (np.array([data[name][last].mean() for name in names]) for names in zip(*pairs, strict=True))

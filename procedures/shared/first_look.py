@@ -31,9 +31,14 @@ def passes(rig: Rig, record: Recorder, found: Iterable[Finding]) -> bool:
     found = list(found)
     if goes_on(rig, found):
         return True
+    ends(record, found)
+    return False
+
+
+def ends(record: Recorder, found: Iterable[Finding]) -> None:
+    """The run ends by what was found: it is put into the recording."""
     told = [{"code": f.code, "text": f.text, "where": f.where} for f in found if f.effect is Effect.ERROR]
     record.event(ENDED, findings=told)
-    return False
 
 
 def with_first(recording: Recording[Any], found: Iterable[Finding]) -> Iterator[Finding]:

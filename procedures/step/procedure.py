@@ -21,9 +21,9 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
 from bench.units import RPM
-from procedures.amb_rotor import frame, lift
+from procedures.amb_rotor import before_lift, frame, lift
 from procedures.amb_rotor.conventions import conventions
-from procedures.shared import assumptions
+from procedures.shared import assumptions, first_look
 from procedures.step import capturing
 from procedures.step.held import check_sizes, planned
 from procedures.step.plan import Plan
@@ -177,6 +177,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     """The response of each case, and what the cases of an axis have in common."""
     from procedures.step import checks, estimates, hum, planes, slewing, untold
 
+    first_look.gate(recording, findings, ())
     before = list(checks.before(recording))
     findings.gate(before)
     exchanged = [] if before else list(planes.find_exchanged(recording))
@@ -269,6 +270,7 @@ procedure = Procedure(
     figures=figures,
     requires=requires,
     check=check,
+    bring_up=before_lift.lifted,
     step_count=step_count,
     assumes=assumptions.STEP,
     method=read_method(__file__),
