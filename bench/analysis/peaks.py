@@ -84,7 +84,7 @@ def peak(x: npt.ArrayLike, values: npt.ArrayLike, covariance: Array, *, seed: in
         float(found - (high - base)),
         float(drawn.std()),
         float(where),
-        max(float(places.std()), _apart(place, where) / math.sqrt(12)),
+        max(float(places.std()), _apart(place, float(where)) / math.sqrt(12)),
         float(np.abs(z).max()),
         bias,
     )

@@ -55,7 +55,7 @@ def margins(surveys: Sequence[Taken], where: str, modes: Sequence[Taken] = ()) -
         return {}
     covariance = power[:, None, None] / 2 * np.eye(2)
     alone = all(t.step_hz == 0 for t in surveys)
-    smooth = peaks.smoother(hz, z, covariance, about=() if alone else _evens(hz, z, covariance))
+    smooth = peaks.smoother(hz, z, covariance, about=[] if alone else _evens(hz, z, covariance))
     base, drawn = smooth.at_lines(z), peaks.noise(covariance, 0, DRAWS)
     seen = smooth.everywhere(z), smooth.everywhere(base), smooth.everywhere(base + drawn)
     found = {
@@ -85,12 +85,12 @@ def margins(surveys: Sequence[Taken], where: str, modes: Sequence[Taken] = ()) -
     return out
 
 
-def _evens(hz: Array, z: Complex, covariance: Array) -> Array:
+def _evens(hz: Array, z: Complex, covariance: Array) -> list[float]:
     """Frequencies where |L| is 1, by local models of the fewest lines: where S has its greatest value at 300 Hz and one nearly
     as great and narrower at 54 Hz, models as wide as the first allows put the phase margin a third too high."""
     fine = peaks.smoother(hz, z, covariance, peaks.WINDOW)
     loop = 1 / fine.everywhere(z) - 1
-    return np.asarray(_crossings(np.abs(loop) - 1, fine.x.astype(np.complex128)).real)
+    return [float(f) for f in _crossings(np.abs(loop) - 1, fine.x.astype(np.complex128)).real]
 
 
 def of_mode(t: Taken) -> tuple[float, float] | None:

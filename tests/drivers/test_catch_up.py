@@ -112,6 +112,13 @@ def handled(host: Host, controller: Controller, steps: WatchedSteps) -> None:
         host.stand_still(0.08)
 
 
+def left_behind(host: Host, controller: Controller, steps: WatchedSteps, within_s: float, behind_s: float) -> None:
+    """A step at whose end telemetry is behind."""
+    with steps.step("dwell"):
+        controller.clock.sleep(within_s)
+        host.stand_still(behind_s)
+
+
 def test_a_fault_that_was_handled_in_a_step_is_not_raised_by_leaving_it(tmp_path: Path) -> None:
     """But by the next poll."""
     with levitated(tmp_path / "handled.mcap") as (host, controller, steps):
@@ -124,9 +131,8 @@ def test_a_fault_that_comes_within_a_step_or_while_it_is_caught_up_ends_the_run(
     for name, within_s, behind_s in (("within", 3.0, 0.0), ("after", 0.1, 3.0)):
         with levitated(tmp_path / f"{name}.mcap") as (host, controller, steps):
             host.renew_lease = lambda: None
-            with pytest.raises(DeviceFault, match="HEARTBEAT_LOST"), steps.step("dwell"):
-                controller.clock.sleep(within_s)
-                host.stand_still(behind_s)
+            with pytest.raises(DeviceFault, match="HEARTBEAT_LOST"):
+                left_behind(host, controller, steps, within_s, behind_s)
 
 
 def test_another_fault_than_the_one_that_was_handled_ends_the_run(tmp_path: Path) -> None:
@@ -141,9 +147,8 @@ def test_another_fault_than_the_one_that_was_handled_ends_the_run(tmp_path: Path
         controller.enable()
         controller.levitate()
         host.renew_lease = lambda: None
-        with pytest.raises(DeviceFault, match="HEARTBEAT_LOST"), steps.step("dwell"):
-            controller.clock.sleep(0.1)
-            host.stand_still(3.0)
+        with pytest.raises(DeviceFault, match="HEARTBEAT_LOST"):
+            left_behind(host, controller, steps, 0.1, 3.0)
     with levitated(tmp_path / "other.mcap") as (host, controller, steps):
         handled(host, controller, steps)
         controller.telemetry.latest["fault"] = 1
