@@ -7,7 +7,15 @@ itself, with its own standard uncertainty u:
     sum over axes and positions of (F_model(beta, offset, t) - F_carries(t))^2 / s^2  +  sum over t of ((t - t_cert) / u)^2
 
 is made least. s is the noise of a position's mean force with what the model is not trusted with, or what the adjustment
-leaves if that is more. The trust is in the weights alone: the scatter that a result is said to have is that of the noise, or of
+leaves if that is more.
+
+What is noisy is read: currents and positions. Beta and the gap bring it into the force, so that s is a share of what the
+coils pull, and goes with beta, offset and t as that does. Over an s that stays, a smaller beta makes the noise smaller, and the
+certificates of an axis that carries little are bent for it. Weights that are taken anew at each step mend it by half: the
+slope over beta holds the same noise as the residual. Of what was read, whose noise depends on no unknown, this is the
+greatest likelihood, with no term in log s.
+
+The trust is in the weights alone: the scatter that a result is said to have is that of the noise, or of
 what the adjustment leaves. Near the solution the result is linear in what was certified: with the normal matrix H,
 d(result)/d(t_cert) = (H^-1)_t / u^2, so that each certificate is an influence by identity, and a wrong one acts as little
 as the positions let it.
@@ -17,6 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -60,6 +69,7 @@ class _Problem:
     names: tuple[str, ...]  # inputs that are not exact
     u: Array
     gaps: tuple[str, ...]  # by axis, which input
+    starts: Array  # eight terms, of the start
     held: tuple[int, ...] = ()  # unknowns that nothing tells and that stay where they are
 
     @property
@@ -72,16 +82,24 @@ class _Problem:
         shifts = t * self.u
         return self.values | {n: self.values[n] + float(d) for n, d in zip(self.names, shifts, strict=True)}
 
-    def left(self, x: Array) -> Array:
-        """Model less force (4 N,) of the unknowns `x`: eight terms, then the inputs' shifts over their u."""
+    def forces(self, x: Array) -> tuple[Array, Array]:
+        """Model less force (4, N), and what both coils pull in the mean (4, 1), N, of the unknowns `x`: eight terms, then the
+        inputs' shifts over their u."""
         p = self.inputs(x[8:])
-        s = magnetics.statics(self.means, p)
-        terms = x[:8].reshape(4, 2)
-        rows = [
-            magnetics.magnet(b * BETA_UNIT, o * OFFSET_UNIT, p[self.gaps[k]], s.r[k], s.p[k], s.n[k]) - s.force[k]
-            for k, (b, o) in enumerate(terms)
-        ]
-        return np.concatenate(rows)
+        s, gaps = magnetics.statics(self.means, p), np.array([[p[gap]] for gap in self.gaps])
+        beta, offset = (x[:8].reshape(4, 2) * [BETA_UNIT, OFFSET_UNIT]).T[:, :, None]
+        positive, negative = (beta * c**2 / (gaps - side * (offset + s.r)) ** 2 for c, side in ((s.p, 1), (s.n, -1)))
+        return positive - negative - s.force, (positive + negative).mean(axis=1, keepdims=True)
+
+    @cached_property
+    def pulled(self) -> Array:
+        """What both coils pull at the start (4, 1), N: the noise is told there."""
+        return self.forces(np.concatenate([self.starts, np.zeros(len(self.names))]))[1]
+
+    def left(self, x: Array) -> Array:
+        """Model less force (4 N,), N, as it would be if the coils pulled what they do at the start: its noise stays."""
+        left, pull = self.forces(x)
+        return (left * self.pulled / pull).ravel()
 
     def slopes(self, x: Array) -> Array:
         """(4 N, unknowns), by central differences."""
@@ -110,16 +128,18 @@ def adjust(
     """
     names = tuple(n for n, e in inputs.items() if e.u > 0)
     gaps = tuple(gap_key(means.machine, a) for a in means.machine.axes)
+    terms = (starts / [BETA_UNIT, OFFSET_UNIT]).ravel()
     problem = _Problem(
         means,
         {n: e.value for n, e in inputs.items()},
         names,
         np.array([inputs[n].u for n in names]),
         gaps,
+        terms,
         tuple(2 * k for k in unloaded),
     )
     count = means.read.shape[1]
-    x = np.concatenate([(starts / [BETA_UNIT, OFFSET_UNIT]).ravel(), np.zeros(len(names))])
+    x = np.concatenate([terms, np.zeros(len(names))])
     x = _least(problem, x, weighed_N)
     left = problem.left(x).reshape(4, count)
     spread = np.sqrt((left**2).sum(axis=1) / (count - 2))
@@ -197,7 +217,7 @@ def _adjusted(problem: _Problem, inputs: Mapping[str, Estimate], x: Array, weigh
     known = np.sqrt(np.maximum(1 - np.diag(inverse)[8:], 0.0))  # u of an adjustment, over the certificate's
     moved = {n: float(v) for n, v in zip(problem.names, x[8:], strict=True)}
     pulls = {n: moved[n] / float(k) for n, k in zip(problem.names, known, strict=True) if k > TOLD}
-    return Adjusted(estimates, values, pulls, moved, terms, left)
+    return Adjusted(estimates, values, pulls, moved, terms, problem.forces(x)[0])
 
 
 def _certified(problem: _Problem, inputs: Mapping[str, Estimate], shares: Array) -> Estimate:
