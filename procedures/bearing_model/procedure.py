@@ -30,7 +30,7 @@ from procedures.bearing_model.inputs import as_printed
 from procedures.bearing_model.plan import Plan
 from procedures.bearing_model.requires import requires
 from procedures.bearing_model.stillness import await_still
-from procedures.bearing_model.walking import Place, go
+from procedures.bearing_model.walking import Place, Walk
 from procedures.shared import assumptions, first_look
 
 if TYPE_CHECKING:
@@ -99,26 +99,24 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     if not _lift(rig, record):
         return
     rig.clock.sleep(3 * plan.settle_s)
-    tilted, at = _tilt(rig, plan, record), CENTRE
+    walk = Walk(rig, plan, record)
+    tilted, at = _tilt(walk), CENTRE
     for k, bias in enumerate(biases(rig.file, plan)):
         if plan.biases_A:
             _set_bias(rig, plan, bias)
         if not as_printed(
             rig.file
         ):  # to the first place it is far; the stand of the thesis has recordings without a wait
-            at = go(rig, plan, at, dict(zip("yz", _first_of(rig.file, plan, k), strict=True)))
-            rig.clock.sleep(FAR * plan.settle_s)
+            at = walk.go(at, dict(zip("yz", _first_of(rig.file, plan, k), strict=True)), FAR * plan.settle_s)
             await_still(rig, record, machine.currents)
         held = []
         for y, z in places(rig.file, plan) if k % 2 == 0 else reversed(places(rig.file, plan)):
-            at = go(rig, plan, at, {"y": y, "z": z})
-            rig.clock.sleep(plan.settle_s)
+            at = walk.go(at, {"y": y, "z": z}, plan.settle_s)
             with record.step(HOLD, y_m=y, z_m=z, **({"bias_A": bias} if math.isfinite(bias) else {})):
                 held.append(_watched(rig, plan, record))
         if k == 0 and not first_look.passes(rig, record, _of_first(rig.file, plan, held, tilted)):
             return
-    go(rig, plan, at, CENTRE)
-    rig.clock.sleep(plan.settle_s)
+    walk.go(at, CENTRE, plan.settle_s)
 
 
 def _first_of(rig: RigFile, plan: Plan, k: int) -> tuple[float, float]:
@@ -166,12 +164,12 @@ def _of_first(
     return list(wiring.of_wiring(first, tilt, rig)) or list(wiring.of_models(first, tilt, rig, plan))
 
 
-def _tilt(rig: Rig, plan: Plan, record: Recorder) -> list[dict[str, float]]:
+def _tilt(walk: Walk) -> list[dict[str, float]]:
+    rig, plan, record = walk.rig, walk.plan, walk.record
     seen = []
     at: Place = UPRIGHT
     for psi, theta in tilts(plan):
-        at = go(rig, plan, at, {"psi": psi, "theta": theta})
-        rig.clock.sleep(plan.settle_s)
+        at = walk.go(at, {"psi": psi, "theta": theta}, plan.settle_s)
         with record.step(TILT, psi_rad=psi, theta_rad=theta):
             seen.append(_watched(rig, plan, record))
     lift.write(rig, conventions(rig.file).point("theta", 0.0))

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from bench.cli.motion_truth import truth_of_motion
-from bench.cli.virtual import simulated_run
+from bench.cli.virtual import Simulated, simulated_run
 from bench.findings import Effect, Finding
 from bench.procedure import Measured
 from bench.rigfile import load_rig
@@ -19,6 +19,7 @@ from procedures.bearing_model.walking import way
 
 TESTS = Path(__file__).resolve().parents[1]
 INCLINE = TESTS / "strangers/incline.toml"
+STAND = TESTS.parent / "examples/plain-stand/stand.toml"
 
 
 def changed(folder: Path, *turns: tuple[str, str]) -> str:
@@ -68,10 +69,25 @@ def test_set_points_that_go_less_far_to_one_side_bound_the_grid(tmp_path: Path) 
 
 def test_an_overhung_shaft_is_not_thrown_past_its_probes_limits(tmp_path: Path) -> None:
     """One jump to a tilt or to the first place went 1.2 jumps past it: ABORTED by the interlock."""
-    run = simulated_run("bearing-model", str(INCLINE), 0, {}, tmp_path / "places.mcap")
+    none_is_wrong(simulated_run("bearing-model", str(INCLINE), 0, {}, tmp_path / "places.mcap"))
+
+
+def test_a_loop_that_goes_farther_past_than_most_is_sent_in_smaller_jumps(tmp_path: Path) -> None:
+    """So slow a controller hardly outdoes the magnets' negative stiffness: its jumps go over three times as far past as they
+    are long. With a bound of 1.5 it threw the shaft out on the way to the first place (ABORTED)."""
+    slow = STAND.read_text(encoding="utf-8").replace("supply_V = 24.0\n", "supply_V = 24.0\nbandwidth = 30\n")
+    assert "bandwidth" in slow
+    (tmp_path / STAND.name).write_text(slow, encoding="utf-8")
+    for dbc in STAND.parent.glob("*.dbc"):
+        (tmp_path / dbc.name).write_bytes(dbc.read_bytes())
+    none_is_wrong(simulated_run("bearing-model", str(tmp_path / STAND.name), 1, {}, tmp_path / "places.mcap"))
+
+
+def none_is_wrong(run: Simulated) -> None:
+    """No finding, and all values are where the truth is."""
     assert [f.code for f in run.results if isinstance(f, Finding) and f.effect is not Effect.NOTE] == []
     truth = {**run.truth, **truth_of_motion(run)}
     found = {f"{m.quantity.name}@{m.where}": m.estimate for m in run.results if isinstance(m, Measured)}
     off = [(e.value - truth[key]) / interval(e).U for key, e in found.items() if key in truth]
-    assert len(off) == 10
+    assert len(off) >= 10
     assert max(map(abs, off)) < 2
