@@ -11,13 +11,13 @@ from functools import partial
 from bench import catalogue
 from bench.cli.broken import forgiven
 from bench.cli.loading import beside, load_procedure, of_entry, requires_of
+from bench.cli.unfit import unfit
 from bench.errors import ConfigError, Lacking, Problem
 from bench.procedure import BenchPlan, Procedure
 from bench.procedure.plans import assemble
 from bench.procedure.requires import lacking
 from bench.record.specs import limited, load_spec
 from bench.rigfile import RigFile
-from bench.rigfile.envelope import Envelope
 
 WIDTH = 80
 UNTOLD = "it cannot be told until the problems of the rig file are mended"
@@ -96,10 +96,10 @@ def _ability(rig: RigFile, procedure: Procedure) -> Ability:
     if plan is None or lacking:
         return Ability(procedure.name, lacking, problems=tuple(problems))
     try:
-        unfit = (*procedure.check(rig, plan), *Envelope(rig).problems_of(dict(procedure.settings(rig, plan))))
+        too_much = tuple(unfit(procedure, rig, plan))
     except Lacking as error:  # a part whose place nobody can tell, which `bench check` names by itself
         return Ability(procedure.name, error.lines, problems=tuple(problems))
-    return Ability(procedure.name, unfit=unfit, problems=tuple(problems))
+    return Ability(procedure.name, unfit=too_much, problems=tuple(problems))
 
 
 def unknown_plans(rig: RigFile) -> Iterator[Problem]:

@@ -25,6 +25,7 @@ from bench.cli.console import Asking, quietly
 from bench.cli.loading import load_procedure
 from bench.cli.opening import live, simulated
 from bench.cli.request import Request
+from bench.cli.unfit import unfit
 from bench.errors import ConfigError
 from bench.link import fault_injection
 from bench.lock import rig_lock
@@ -32,7 +33,6 @@ from bench.procedure import BenchPlan, Procedure, plans
 from bench.record.specs import load_spec, misnamed
 from bench.recording.earlier import Earlier
 from bench.rigfile import RigFile, linkurl, load_rig
-from bench.rigfile.envelope import Envelope
 from bench.run import stopped
 from bench.run.adoption import due
 from bench.run.job import Connect, Job
@@ -66,7 +66,7 @@ def planned(request: Request, earlier: Earlier | None = None) -> tuple[Procedure
         plan = earlier.recording.plan_as(procedure.plan)
     if earlier is not None:
         stopped.require_same_plan(earlier.recording, plan.model_dump(mode="json"))
-    problems = [*procedure.check(rig, plan), *Envelope(rig).problems_of(dict(procedure.settings(rig, plan)))]
+    problems = list(unfit(procedure, rig, plan))
     if problems:
         raise ConfigError("\n  ".join(["the plan does not fit the rig; nothing was started:", *problems]))
     return procedure, rig, plan

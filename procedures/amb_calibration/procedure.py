@@ -8,11 +8,13 @@ tangent at the current that carries the rotor's own weight. Horizontal constants
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bench.errors import Lacking
 from bench.figures import Figure
 from bench.findings import Ended, Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
@@ -210,9 +212,14 @@ def masses_u(recording: Recording[Plan]) -> np.ndarray:
 
 
 def planned(rig: RigFile) -> Mapping[str, Any]:
-    """All the masses that the rig has and may bear; the plan's own names where they are too few, which `check` says."""
+    """All the masses that the rig has and may bear, the plan's own names where they are too few, which `check` says; the bias
+    by default, of bearings that have unlike ones the least."""
     labels = by_weight(rig)
-    return {"masses": labels} if len(labels) >= FEWEST_MASSES else {}
+    found: dict[str, Any] = {"masses": labels} if len(labels) >= FEWEST_MASSES else {}
+    with suppress(Lacking):  # a rig that it cannot run on: `lacking` says so
+        biases = [rig.parameters[name].default for name in turns.biases(rig) if name in rig.parameters]
+        found |= {"bias_A": min(biases)} if biases else {}
+    return found
 
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
