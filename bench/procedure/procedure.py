@@ -110,8 +110,8 @@ class Procedure:
     a rig that has it, before anything starts, and names what cannot work. `settings` are the parameters of the rig's
     controller, SI, that the runner writes in READY, before it levitates. `bring_up` brings the rig from READY into `state`
     where there is something to look at on the way; where it says False nothing is acquired, and the analysis tells why.
-    `optional` of the measures are those that a sound
-    machine may lack: not missing where no limit asks; `untold` are those that a rig cannot show, whatever its state.
+    `optional` of the measures are those that a sound machine may lack: not missing where no limit asks; `untold` are those
+    that a rig cannot show, whatever its state.
     `left_out` are those that a plan does not measure: none of them is missing, and a limit for one judges nothing.
     `planned` are settings of a plan as they are on a rig by default, where those of the plan itself do not fit every rig: its
     masses, its speeds; the rig file and who asks say otherwise.
