@@ -52,6 +52,18 @@ def test_a_limit_at_a_place_that_was_not_measured_is_a_missing_quantity(run: Run
     ]
 
 
+def test_what_a_note_says_is_not_told_does_not_pass_by_another_place(run: Run) -> None:
+    limits = {"supply": Limit(140, 160, "V", "test", True)}
+    assert run(Plan(then="note")).outcome is Outcome.DONE  # no limit asks for it
+    result = run(Plan(then="note"), limits=limits)
+    assert result.outcome is Outcome.ERROR
+    assert [(m.where, m.verdict) for m in result.record.measurements] == [
+        ("", Verdict.PASS),
+        ("hall", Verdict.MISSING),
+    ]
+    assert run(limits=limits).outcome is Outcome.PASS
+
+
 @pytest.mark.parametrize(
     ("low", "high", "outcome"),
     [(140, 160, Outcome.PASS), (160, 180, Outcome.FAIL), (148, 160, Outcome.INDETERMINATE)],

@@ -22,7 +22,7 @@ class Plan(BenchPlan):
     """`act` is what happens in the middle of acquire, `then` what analyse does."""
 
     act: Literal["measure", "raise", "refuse", "stop", "count", "spin", "drive"] = "measure"
-    then: Literal["yield", "nothing", "doubt", "raise"] = "yield"
+    then: Literal["yield", "nothing", "doubt", "raise", "note"] = "yield"
     seconds: float = 0.5
     bias_A: float = 3.0
 
@@ -76,6 +76,8 @@ def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
         raise ZeroDivisionError("a mistake in the analysis")
     if plan.then == "nothing":
         return
+    if plan.then == "note":
+        yield Finding("untold", "nothing is told of the hall", "hall", concerns=("supply@hall",))
     if plan.then == "doubt":
         yield Finding("doubt", "this number is not to be trusted", "supply", Effect.INDETERMINATE)
     step = next(iter(recording.steps("look")))

@@ -6,9 +6,10 @@ The runner and `bench analyse` both come here, and neither hands over anything b
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from itertools import chain
+from types import MappingProxyType
 from typing import Any
 
 from bench.calibration import Calibration
@@ -138,7 +139,7 @@ def evaluate(
     except Exception as error:
         findings.append(_failed(error))
         entries, correlations = {}, Correlations((), ())
-    measurements = _in_order(procedure, entries, limits)
+    measurements = _in_order(procedure, entries, limits, _noted(findings, entries, limits))
     if recording.verdict_required and (nothing := unjudged(measurements, len(stated))) is not None:
         findings.append(nothing)
     certified = certified_of(recording.rig, (e.influence for m in measurements for e in m.budget))
@@ -194,17 +195,37 @@ def _accept(procedure: Procedure, item: Measured, measured: dict[tuple[str, str]
     measured[key] = item
 
 
+def _noted(
+    findings: Iterable[Finding], entries: Collection[tuple[str, str]], limits: Mapping[str, Limit]
+) -> Mapping[str, list[tuple[str, Limit]]]:
+    """By quantity, places at which notes say that it is not told though a limit asks for it: what was measured at others does
+    not pass for it. A finding that is more than a note decides by itself."""
+    out: dict[str, list[tuple[str, Limit]]] = {}
+    measured = {name for name, _ in entries}
+    for concern in (c for f in findings if f.effect is Effect.NOTE for c in f.concerns):
+        name, at, where = concern.partition("@")
+        told = not at or name not in measured or (name, where) in entries
+        limit = None if told else limit_of(limits, name, where)
+        if limit is not None:
+            out.setdefault(name, []).append((where, limit))
+    return out
+
+
 def _in_order(
-    procedure: Procedure, entries: Mapping[tuple[str, str], Measurement], limits: Mapping[str, Limit]
+    procedure: Procedure,
+    entries: Mapping[tuple[str, str], Measurement],
+    limits: Mapping[str, Limit],
+    noted: Mapping[str, list[tuple[str, Limit]]] = MappingProxyType({}),
 ) -> tuple[Measurement, ...]:
     """As declared, with a missing entry where nothing was yielded that a sound machine has, or that a limit asks for, of a
-    quantity or at a place."""
+    quantity or at a place; `noted` are such places by quantity."""
     out: list[Measurement] = []
     for quantity in dict.fromkeys((*procedure.measures, *procedure.kinds)):
         found = [m for (name, _), m in entries.items() if name == quantity.name]
         limit = limits.get(quantity.name)
         placed = [missing(quantity, asked, place)
-                  for place, asked in never_measured(limits, quantity.name, (m.where for m in found))]  # fmt: skip
+                  for place, asked in (*never_measured(limits, quantity.name, (m.where for m in found)),
+                                       *noted.get(quantity.name, ()))]  # fmt: skip
         declared = quantity in procedure.measures and quantity not in procedure.optional
         if limit is not None or (declared and not placed):
             found = found or [missing(quantity, limit)]

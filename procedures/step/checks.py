@@ -16,7 +16,7 @@ from procedures.shared import signals
 from procedures.step.estimates import Result
 from procedures.step.plan import Plan
 from procedures.step.steps import STEP, Case, Done
-from procedures.step.untold import Why
+from procedures.step.untold import OF_CASE, OF_GROUP, OF_SIZES, Why
 
 FATAL = (
     "current-sign",
@@ -240,16 +240,18 @@ def of_results(
                 "along both, with two oscillations that lie far apart. One is what would be fitted: overshoot, settling, "
                 "bandwidth, damping and frequency are not told; rise and error are."
             )
-            yield Finding("axes-oblique", text, where)
+            coupled = [f"{q}@{c.where}" for c in results if c.group == where for q in (*OF_CASE, "settling_time")]
+            coupled += [f"{q}@{where}" for q in (*OF_SIZES, *OF_GROUP)]
+            yield Finding("axes-oblique", text, where, concerns=tuple(coupled))
         elif untold.get(where) is Why.TORN:
             text = (
                 "two oscillations share the response, and one of them is damped so heavily that it hardly swings, as where one "
                 "bearing holds the shaft much more softly: damping and frequency of their mean are not told."
             )
-            yield Finding("oscillations-unlike", text, where)
+            yield Finding("oscillations-unlike", text, where, concerns=tuple(f"{q}@{where}" for q in OF_GROUP))
         elif "damping" not in estimates and where not in untold:
-            yield Finding("no-oscillation", "no oscillation that dies away fits the response: damping and frequency are not "
-                          "told.", where)  # fmt: skip
+            text = "no oscillation that dies away fits the response: damping and frequency are not told."
+            yield Finding("no-oscillation", text, where, concerns=tuple(f"{q}@{where}" for q in OF_GROUP))
 
 
 def _longer(result: Result) -> str:
