@@ -111,7 +111,7 @@ def fly(bed: Bed, procedure: str, plan: Sequence[str], seed: int, truth: Mapping
     path.unlink(missing_ok=True)
     rig = load_rig(bed.rig)
     settings = assemble(load_procedure(procedure).plan, (rig.name, rig.plans.get(procedure, {})), None, plan)
-    done = flown(procedure, bed.rig, seed, settings.model_dump(), path, truth, known)
+    done = flown(procedure, bed.rig, seed, settings.model_dump(exclude_unset=True), path, truth, known)
     if done.machine.cause is None:
         try:
             return done.analysed()

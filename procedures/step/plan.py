@@ -18,10 +18,12 @@ class Plan(BenchPlan):
     sizes_m: tuple[float, ...] = Field((10e-6, 20e-6), min_length=2)  # one alone says nothing of linearity
     speeds_rad_s: tuple[float, ...] = Field((0.0,), min_length=1)
     repeats: int = Field(2, ge=2)  # of: up, back, down, back
-    a: dict[str, float] = Field(default_factory=dict)  # parameters of the controller
-    b: dict[str, float] = Field(default_factory=dict)  # the other setting; empty: nothing is compared
+    a: dict[str, float | str] = Field(
+        default_factory=dict
+    )  # parameters of the controller, or a named setting by its kind
+    b: dict[str, float | str] = Field(default_factory=dict)  # the other setting; empty: nothing is compared
     names: tuple[str, str] = ("A", "B")
-    warm: dict[str, float] = Field(default_factory=dict)  # on top of either setting until it is warm
+    warm: dict[str, float | str] = Field(default_factory=dict)  # on top of either setting until it is warm
     warm_s: float = Field(4.0, ge=0)
     settle_s: float = Field(5.0, ge=0.1)  # with the setting itself
     model_error: float = Field(

@@ -26,6 +26,7 @@ from procedures.amb_rotor.conventions import conventions
 from procedures.shared import assumptions, first_look
 from procedures.step import capturing
 from procedures.step.held import check_sizes, planned
+from procedures.step.named import check_settings, list_settings, setting_names, written
 from procedures.step.plan import Plan
 from procedures.step.position import leans
 from procedures.step.record_length import enough_s, faded_s
@@ -59,12 +60,6 @@ COUPLED = (OVERSHOOT, SETTLING, BANDWIDTH, DAMPING, FREQUENCY, SIZE, WAY)  # unt
 MARGIN = 0.8  # of the clearance that a step with its overshoot may use
 
 
-def list_settings(plan: Plan) -> dict[str, dict[str, float]]:
-    """The settings by name."""
-    first = {plan.names[0]: plan.a}
-    return first | {plan.names[1]: plan.b} if plan.b else first
-
-
 def model(rig: RigFile, plan: Plan) -> dict[str, float]:
     """The controller's idea of the bearings, wrong by what the plan says; what the rig file says where that is nothing."""
     return {n: rig.parameters[n].default * (1 + plan.model_error) for n in model_names(rig, plan)}
@@ -75,13 +70,13 @@ def recorded_s(rig: RigFile, plan: Plan) -> float:
     if plan.record_s is not None:
         return plan.record_s
     return enough_s(
-        conventions(rig), [{**_usual(rig), **s} for s in list_settings(plan).values()], plan.axes, plan.band
+        conventions(rig), [{**_usual(rig), **s} for s in list_settings(plan, rig).values()], plan.axes, plan.band
     )
 
 
 def waited_s(rig: RigFile, plan: Plan, setting: str, axis: str) -> float:
     """Before the rest of each step, s, until what the one before it leaves is nothing."""
-    needed = faded_s(conventions(rig), {**_usual(rig), **list_settings(plan)[setting]}, axis, plan.band)
+    needed = faded_s(conventions(rig), {**_usual(rig), **list_settings(plan, rig)[setting]}, axis, plan.band)
     return max(needed - recorded_s(rig, plan) - plan.rest_s, 0.0)
 
 
@@ -91,12 +86,12 @@ def _usual(rig: RigFile) -> dict[str, float]:
 
 def step_count(plan: Plan) -> int:
     """How many steps `acquire` records, for the progress display."""
-    return 4 * plan.repeats * len(list(cases(tuple(list_settings(plan)), plan.speeds_rad_s, plan.axes, plan.sizes_m)))
+    return 4 * plan.repeats * len(list(cases(setting_names(plan), plan.speeds_rad_s, plan.axes, plan.sizes_m)))
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Up, back, down and back for every case; the shaft stands and the controller has its own settings again in the end."""
-    settings, machine = list_settings(plan), conventions(rig.file)
+    settings, machine = list_settings(plan, rig.file), conventions(rig.file)
     used: dict[str, float] = {}
     record_s = recorded_s(rig.file, plan)
     lift.write(rig, model(rig.file, plan))
@@ -155,12 +150,12 @@ def _at(rig: Rig, plan: Plan, record: Recorder, speed: float) -> bool:
 
 def _put(rig: Rig, plan: Plan, setting: Mapping[str, float], used: dict[str, float]) -> None:
     """A setting of the controller: what the other one changed is undone; first warm, if there is anything to be warmed."""
-    before = {n: rig.file.parameters[n].default for n in used if n not in setting}
-    lift.write(rig, {**before, **setting, **plan.warm})
-    used |= {**before, **setting, **plan.warm}
-    if plan.warm:
+    before, warm = {n: rig.file.parameters[n].default for n in used if n not in setting}, written(plan.warm, rig.file)
+    lift.write(rig, {**before, **setting, **warm})
+    used |= {**before, **setting, **warm}
+    if warm:
         rig.clock.sleep(plan.warm_s)
-        lift.write(rig, {n: setting.get(n, rig.file.parameters[n].default) for n in plan.warm})
+        lift.write(rig, {n: setting.get(n, rig.file.parameters[n].default) for n in warm})
     rig.clock.sleep(plan.settle_s)
 
 
@@ -220,7 +215,11 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
         if not machine.can_point(axis):
             yield f"axes: found {axis}; expected one along which the controller takes set points"
     points = [name for a in plan.axes if machine.can_point(a) for name in machine.point(a, 0.0)]
-    needed = [*points, *model_names(rig, plan), *plan.a, *plan.b, *plan.warm]
+    if unknown := list(check_settings(plan, rig)):
+        yield from unknown
+        return
+    asked = [name for of in (plan.a, plan.b, plan.warm) for name in written(of, rig)]
+    needed = [*points, *model_names(rig, plan), *asked]
     for name in dict.fromkeys(needed):
         if name not in rig.parameters:
             yield f"parameters: found no {name}; needed are those of the plan's settings"

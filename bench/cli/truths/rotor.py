@@ -21,7 +21,8 @@ MARGIN_POINTS = 20000
 
 def step(done: Simulated) -> Found:
     from procedures.amb_rotor.conventions import conventions
-    from procedures.step.procedure import list_settings, model, recorded_s, waited_s
+    from procedures.step.named import list_settings
+    from procedures.step.procedure import model, recorded_s, waited_s
     from procedures.step.steps import AT_REST_S, Case
     from sim_backend.motion import StepsAsked
 
@@ -30,7 +31,7 @@ def step(done: Simulated) -> Found:
     if steps is None:
         return
     other_band = {r.where for r in done.results if isinstance(r, Finding) and r.code == "band-widened"}
-    for setting, changed in list_settings(plan).items():
+    for setting, changed in list_settings(plan, rig).items():
         settings = settings_of(done, model(rig, plan), changed)
         for speed in plan.speeds_rad_s:
             window = 2 * math.pi / speed if speed else AT_REST_S
