@@ -70,10 +70,10 @@ def test_triggers_of_the_mark_go_by_the_rig_file_and_no_request_raises() -> None
 
 
 def test_a_margin_that_its_bias_takes_below_zero_is_not_told() -> None:
-    """It had a negative number of decibels' argument."""
-    draws = np.full(100, 0.5)
-    assert _freed(0.2, 0.2, draws) is None
-    assert _freed(0.6, 0.2, draws) == pytest.approx((0.3, 0.0))
+    """It had a negative number of decibels' argument. Nor one whose draws all lie far beside the curve."""
+    assert _freed(0.2, 0.2, np.full(100, 0.5)) is None
+    assert _freed(0.6, 0.2, np.full(100, 0.5)) is None
+    assert _freed(0.6, 0.2, np.tile([0.2, 0.22], 50)) == pytest.approx((0.59, 0.01))
 
 
 FASTER = ("tick_s = 5e-5", "tick_s = 8e-5")

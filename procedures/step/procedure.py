@@ -25,7 +25,7 @@ from procedures.amb_rotor import before_lift, frame, lift
 from procedures.amb_rotor.conventions import conventions
 from procedures.shared import assumptions, first_look
 from procedures.step import capturing
-from procedures.step.held import check_sizes, planned
+from procedures.step.held import check_sizes
 from procedures.step.named import check_settings, list_settings, setting_names, written
 from procedures.step.plan import Plan
 from procedures.step.position import leans
@@ -262,7 +262,6 @@ procedure = Procedure(
     optional=(SETTLING, DAMPING, FREQUENCY),  # what does not settle is a finding, what does not swing a note
     state=RigState.LEVITATED,
     plan=Plan,
-    planned=planned,
     acquire=acquire,
     evaluate=evaluate,
     measured=measured,

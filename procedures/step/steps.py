@@ -20,6 +20,7 @@ from procedures.amb_rotor.machine import AmbRotor
 from procedures.amb_rotor.onset import pushing
 from procedures.step import acting, capturing
 from procedures.step.acting import START_S, UNLIKE
+from procedures.step.held import asked_over_sent
 from procedures.step.position import ends_of, made_of, shares
 from procedures.step.requires import channels
 from procedures.step.response import trailing
@@ -178,8 +179,10 @@ def _done(
     rig: RigFile, step: Step, case: Case, data: Mapping[str, npt.NDArray[Any]], rest: npt.NDArray[np.bool_]
 ) -> Done:
     axis, other, machine = case.axis, {"y": "z", "z": "y", "x": "y"}[case.axis], conventions(rig)
-    raw, across = (made_of(data, shares(rig, one), len(rest)) for one in (axis, other))
-    ends = [made_of(data, of, len(rest)) for of in ends_of(rig, axis)]
+    # in steps as they were asked for, each of which is what was sent: overshoot, band and error are about that
+    of_sent = asked_over_sent(rig, axis, float(step.labels["begin_m"]), case.way * case.size)
+    raw, across = (of_sent * made_of(data, shares(rig, one), len(rest)) for one in (axis, other))
+    ends = [of_sent * made_of(data, of, len(rest)) for of in ends_of(rig, axis)]
     tilt = (ends[1] - ends[0]) / 2 if len(ends) > 1 else np.zeros(len(rest))
     ones = [pushing(machine, axis, a, data) for a in machine.along(axis)]
     control = sum(ones, np.zeros(len(rest)))

@@ -51,8 +51,6 @@ def test_rises_that_go_with_the_size_are_ramps(rises: tuple[float, float], told:
         ({"current_sign_i": -1.0}, {}, "current-sign"),
         pytest.param({"told_planes": 1.0}, {}, "planes-exchanged", marks=pytest.mark.long),
         ({"told_planes": 1.0}, {"speeds_rad_s": (FAST,)}, "planes-exchanged"),
-        pytest.param({"position_range": 30e-6}, {}, "sensor-clipped", marks=pytest.mark.long),
-        ({"geometry.clearance": 26e-6}, {}, "contact"),
         pytest.param({"supply_V": 12.0, "inductance": 60e-3}, {}, "voltage-saturated", marks=pytest.mark.long),
         ({"pulse_missing": 3.0}, {"speeds_rad_s": (FAST,)}, "speed-off"),
         pytest.param({"drop_fraction": 0.005}, {}, "missing-samples", marks=pytest.mark.long),
@@ -83,15 +81,30 @@ def test_a_finding_about_one_axis_leaves_the_other_alone(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize(
+    ("defect", "code"),
+    [
+        ({"geometry.clearance": 26e-6}, "ring-too-near"),
+        pytest.param({"position_range": 30e-6}, "ring-too-near", marks=pytest.mark.long),
+        ({"position_sign_yi": -1.0}, "sensor-polarity"),
+        ({"exchange_planes": 1.0}, "planes-exchanged"),
+    ],
+)
+def test_what_its_rest_or_its_lift_shows_ends_the_run_before_a_step(
+    tmp_path: Path, defect: Mapping[str, float], code: str
+) -> None:
+    measured, findings = stepped(tmp_path, 1, defect)
+    assert not measured
+    assert code in {f.code for f in findings if f.effect is Effect.ERROR}
+
+
+@pytest.mark.parametrize(
     ("defect", "named"),
     [
-        ({"position_sign_yi": -1.0}, "sensors"),
-        ({"exchange_planes": 1.0}, "sensors"),
         ({"drive_fault_after_s": 8.0}, "EXTERNAL"),
         ({"drive_limit": 0.002}, "OVERLOAD"),
     ],
 )
-def test_what_cannot_levitate_or_turn_ends_the_run(tmp_path: Path, defect: Mapping[str, float], named: str) -> None:
+def test_what_cannot_turn_ends_the_run(tmp_path: Path, defect: Mapping[str, float], named: str) -> None:
     """The controller's own supervision or the drive's is first: the run is aborted and says what reported it."""
     with pytest.raises(BenchError, match=named):
         stepped(tmp_path, 1, defect, speeds_rad_s=(FAST,))

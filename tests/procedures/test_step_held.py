@@ -1,16 +1,21 @@
-"""Steps that the controller's messages cannot hold as asked: refused before anything starts, avoided by default."""
+"""Steps that the controller's messages do not hold as asked: they are what was sent; far from it they are refused."""
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 
 import pytest
 
+from bench.cli.motion_truth import truth_of_motion
+from bench.cli.virtual import simulated_run
+from bench.procedure import Measured
 from bench.rigfile import RigFile, load_rig
-from procedures.step.held import grain, held
+from bench.uncertainty import interval
+from procedures.step.held import asked_over_sent, grain, sent
 from procedures.step.plan import Plan
-from procedures.step.procedure import check, procedure
+from procedures.step.procedure import check
 
 STAND = Path(__file__).resolve().parents[2] / "examples/plain-stand"
 
@@ -27,33 +32,35 @@ def coarse(folder: Path, scale: str) -> RigFile:
     return load_rig(str(folder / "stand.toml"))
 
 
-@pytest.mark.parametrize(
-    ("value", "of", "near"),
-    [
-        (1e-5, 1e-8, 1e-5),
-        (1.0005e-5, 1e-8, 1.0e-5),
-        (1e-5, 3e-7, 9.9e-6),
-        (1e-5, 0.0, 1e-5),
-        (1e-5 + 5e-11, 1e-8, 1e-5 + 5e-11),
-    ],
-)
-def test_a_multiple_of_the_grain(value: float, of: float, near: float) -> None:
-    assert held(value, of) == pytest.approx(near, rel=1e-12)
-
-
-def test_a_size_between_two_set_points_is_refused_with_the_nearest() -> None:
-    """It had ended 0.05 % beside what was asked for, and the settling time 7 U."""
+def test_what_is_sent_is_the_nearest_that_a_signal_holds(tmp_path: Path) -> None:
+    """By hand: 10 um by 0.3 um are 33 of them, 20 um 67; at 45 degrees 10 um are 7.0711 um, which one
+    bearing's signals hold as 7.07 um."""
     rig = load_rig(str(STAND / "stand.toml"))
     assert grain(rig, "SollYVorn") == pytest.approx(1e-8)
-    assert list(check(rig, Plan())) == []
-    (found,) = check(rig, Plan(axes=("y",), sizes_m=(1.0005e-5, 2e-5)))
-    assert found.startswith("sizes_m: found 10.005 um along y")
-    assert "expected what its signal holds, as 10 um (steps of 0.01 um)" in found
+    assert sent(rig, "y", 1.0024e-5) == pytest.approx(1.002e-5)
+    assert asked_over_sent(rig, "y", 0.0, 1.0024e-5) == pytest.approx(1.0024 / 1.002)
+    assert asked_over_sent(rig, "y", 0.0, 2e-5) == 1.0
+    coarser = coarse(tmp_path, "0.3")
+    assert sent(coarser, "z", 1e-5) == pytest.approx(9.9e-6)
+    assert sent(coarser, "y", 2e-5) == pytest.approx(2.01e-5)
+    turned = load_rig(str(STAND.parents[1] / "tests/strangers/gemischt.toml"))
+    assert sent(turned, "y", 1e-5) == pytest.approx((7.07e-6 + 7.071068e-6) / math.sqrt(2), rel=1e-6)
 
 
-def test_default_sizes_are_such_that_set_points_hold_them(tmp_path: Path) -> None:
-    rig = coarse(tmp_path, "0.3")
-    assert list(check(rig, Plan()))
-    assert procedure.planned(rig)["sizes_m"] == pytest.approx((9.9e-6, 2.01e-5))
-    assert list(check(rig, Plan(**procedure.planned(rig)))) == []
-    assert procedure.planned(load_rig(str(STAND / "stand.toml"))) == {}
+def test_sizes_that_cannot_nearly_be_sent_are_refused(tmp_path: Path) -> None:
+    assert list(check(load_rig(str(STAND / "stand.toml")), Plan(sizes_m=(1.0005e-5, 2e-5)))) == []
+    found = list(check(coarse(tmp_path, "0.3"), Plan(axes=("y",), sizes_m=(1e-6, 2e-5))))
+    assert len(found) == 1
+    assert found[0].startswith("sizes_m: found 1 um along y, which is sent as 0.9 um")
+    assert "SollYVorn 0.3 um" in found[0]
+
+
+def test_settling_is_in_the_band_about_what_was_sent(tmp_path: Path) -> None:
+    """10.005 um, sent as 10 um, settled 7 U beside the truth in the band about 10.005 um."""
+    plan = {"axes": ["y"], "sizes_m": [1.0005e-5, 2e-5], "settle_s": 1.0}
+    run = simulated_run("step", str(STAND / "stand.toml"), 1, plan, tmp_path / "s.mcap")
+    true = truth_of_motion(run)
+    times = [m for m in run.results if isinstance(m, Measured) and m.quantity.name == "settling_time"]
+    assert len(times) == 4
+    for m in times:
+        assert abs(m.estimate.value - true[f"settling_time@{m.where}"]) < 1.2 * interval(m.estimate).U, m.where
