@@ -41,9 +41,9 @@ class Host(HostClock):
         return batch
 
 
-def recorded(path: Path, behind_s: float, wait: bool = True) -> tuple[float, int, Controller]:
-    """Fall behind, record a step, and command a motor current after it: by how much that current is greater in the last 50 ms
-    of the step than before, A, how many samples the step has, and the driver."""
+@contextmanager
+def levitated(path: Path) -> Iterator[tuple[Host, Controller, WatchedSteps]]:
+    """A controller that holds the shaft, recorded; its heartbeats end where `renew_lease` of the host does nothing."""
     host = Host()
     controller = Controller(RIG, host, host, Session(1, 1_767_225_600, "test"))
     header = RunHeader({"run": {}}, {"rig.toml": RIG.toml_text.encode(), "rig.dbc": RIG.dbc_text.encode()})
@@ -52,10 +52,19 @@ def recorded(path: Path, behind_s: float, wait: bool = True) -> tuple[float, int
         controller.recorder = recorder
         controller.enable()
         controller.levitate()
+        yield host, controller, WatchedSteps(recorder, Silent(), controller.catch_up)
+
+
+def recorded(path: Path, behind_s: float, wait: bool = True) -> tuple[float, int, Controller]:
+    """Fall behind, record a step, and command a motor current after it: by how much that current is greater in the last 50 ms
+    of the step than before, A, how many samples the step has, and the driver."""
+    with levitated(path) as (host, controller, steps):
         controller.set("i_ramp", 5.0)
         host.stand_still(behind_s)
         controller.clock.sleep(2.0)
-        steps = WatchedSteps(recorder, Silent(), controller.catch_up if wait else lambda: None)
+        if not wait:
+            assert isinstance(controller.recorder, Recorder)
+            steps = WatchedSteps(controller.recorder, Silent(), lambda: None)
         with steps.step("dwell"):
             controller.clock.sleep(0.2)
         controller.set("i_y", 1.0)
@@ -87,20 +96,6 @@ def test_a_controller_that_is_too_far_behind_is_not_waited_for_and_the_run_says_
     controller.clock.sleep(0.1)
     controller.catch_up()
     assert controller.cut_ns > 0
-
-
-@contextmanager
-def levitated(path: Path) -> Iterator[tuple[Host, Controller, WatchedSteps]]:
-    """A controller that holds the shaft, recorded; its heartbeats end where `renew_lease` of the host does nothing."""
-    host = Host()
-    controller = Controller(RIG, host, host, Session(1, 1_767_225_600, "test"))
-    header = RunHeader({"run": {}}, {"rig.toml": RIG.toml_text.encode(), "rig.dbc": RIG.dbc_text.encode()})
-    controller.connect()
-    with Recorder(path, clock=controller.clock, streams=[controller.telemetry.layout], header=header) as recorder:
-        controller.recorder = recorder
-        controller.enable()
-        controller.levitate()
-        yield host, controller, WatchedSteps(recorder, Silent(), controller.catch_up)
 
 
 def handled(host: Host, controller: Controller, steps: WatchedSteps) -> None:
