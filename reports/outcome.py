@@ -31,9 +31,9 @@ def outcome_text(record: Content, rows: Sequence[ResultRow], findings: Sequence[
     loud = ", ".join(dict.fromkeys(f.code for f in told))
     match outcome:
         case "PASS" if any(r.tone == "pass" for r in rows):
-            return "Every declared quantity was measured, and every limit is met by the whole 95 % interval."
+            return f"{_measured(record)}, and every limit is met by the whole 95 % interval."
         case "PASS" | "DONE":  # a record of schema 1 says PASS of both
-            return "Every declared quantity was measured. No acceptance limit was applied."
+            return f"{_measured(record)}. No acceptance limit was applied."
         case "FAIL":
             return (outside + (f"Findings that prevent other decisions: {loud}." if affecting else "")).strip()
         case "INDETERMINATE":
@@ -45,6 +45,20 @@ def outcome_text(record: Content, rows: Sequence[ResultRow], findings: Sequence[
             return "The run was stopped before its end." + (f" See the finding {loud}." if loud else "")
         case _:
             return (outside + "The bench could not tell." + (f" See the finding {loud}." if loud else "")).strip()
+
+
+def _measured(record: Content) -> str:
+    """That all was measured, but for what a note says is not told at a place."""
+    told = {(m.get("name"), m.get("where")) for m in record.get("measurements") or () if isinstance(m, Mapping)}
+    untold: dict[str, None] = {}
+    codes: dict[str, None] = {}
+    for f in record.get("findings") or ():
+        for concern in (f.get("concerns") or ()) if isinstance(f, Mapping) else ():
+            name, at, where = str(concern).partition("@")
+            if at and (name, where) not in told:
+                untold[name.replace("_", " ")] = codes[str(f.get("code", ""))] = None
+    every = "Every declared quantity was measured"
+    return f"{every}, but not {', '.join(untold)} everywhere ({', '.join(codes)})" if untold else every
 
 
 def _named(rows: Sequence[ResultRow], tone: str) -> str:

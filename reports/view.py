@@ -24,7 +24,7 @@ DECISION_RULE = (
     "interval lies inside the limits, fails if the whole interval lies outside them, and is indeterminate otherwise. "
     "For a stated pass the probability that the true value lies beyond a given limit is at most 2.5 %. A result "
     "without a limit, or with one that was stated for other settings, is reported without a verdict. The outcome is PASS "
-    "only if every declared quantity was measured, at least one was judged, no verdict is fail or indeterminate, and no "
+    "only if no declared quantity is missing, at least one was judged, no verdict is fail or indeterminate, and no "
     "finding affects the outcome; it is DONE if nothing was judged. Data that contradict each other support no statement of "
     "non-conformity: where a finding concerns a quantity that fails, the outcome is INDETERMINATE."
 )

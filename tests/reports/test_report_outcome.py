@@ -53,6 +53,19 @@ def test_a_run_that_nothing_judged_has_a_neutral_box() -> None:
     assert pdf.render(made, None).startswith(b"%PDF")
 
 
+def test_what_a_note_leaves_untold_was_not_measured() -> None:
+    """Page 1 said of a run that tells no damping that every declared quantity was measured."""
+    note = {"code": "no-oscillation", "text": "None fits.", "where": "A, y", "effect": "note",
+            "concerns": ["damping@A, y", "natural_frequency@A, y"]}  # fmt: skip
+    made = view(
+        outcome="DONE", measurements=[measurement(verdict="none", limit=None)], findings=[note], correlations=None
+    )
+    assert made.outcome_text == (
+        "Every declared quantity was measured, but not damping, natural frequency everywhere (no-oscillation). "
+        "No acceptance limit was applied."
+    )
+
+
 def test_pass_without_limits_claims_no_conformity() -> None:
     made = view(measurements=[measurement(verdict="none", limit=None)])
     assert made.outcome_text.endswith("No acceptance limit was applied.")
