@@ -35,7 +35,7 @@ from bench.procedure import Measured
 from bench.rigfile import RigFile, load_rig
 from bench.rigfile.toleranced import Toleranced
 from bench.uncertainty import interval
-from benchmarks.cases import RIGS, load, needed_by
+from benchmarks.cases import FOREIGN, RIGS, load, needed_by
 from reports.unseen import is_reached
 from sim_backend.machines.table import machine_of
 
@@ -46,6 +46,8 @@ MORE_SEEDS = (1, 2)  # beside the first, for what would fail on it
 ORDER = ("nothing", "budget", "listed", "FAILS")
 LINEAR = 1.5  # how far a shift may exceed the linear share of three half widths, beside the scatter of two runs
 RPM = math.pi / 30
+TWINS = {rig: (*names, "tracking", *(["spindown"] if "balance" in names else [])) for rig, names in FOREIGN.items()}
+"""Rigs of the examples, by their twins."""
 QUICK: Mapping[str, Mapping[str, Any]] = {
     "amb-calibration": {"settle_s": 0.3, "average_s": 0.2},
     "force-constant": {"levels_A": (-1.5, -0.75, 0.0, 0.75, 1.5), "ramp_A_s": 5, "settle_s": 0.15, "average_s": 0.2},
@@ -100,14 +102,15 @@ def numbers(rig: RigFile) -> dict[str, float]:
 
 
 def attempt(procedure: str, rig: str, seed: int, truth: Mapping[str, float], folder: Path) -> Simulated:
-    """The run with what it needs before it, all on the same machine.
+    """The run with what it needs before it, all on the same machine; on a twin, what of that its rig can do.
 
     Raises:
         BenchError: one of them is stopped.
     """
     known: dict[str, Calibration] = {}
     path = folder / "recording.mcap"
-    for name, switches in {**needed_by(procedure), procedure: {}}.items():
+    before = {name: switches for name, switches in needed_by(procedure).items() if name in TWINS.get(rig, (name,))}
+    for name, switches in {**before, procedure: {}}.items():
         path.unlink(missing_ok=True)
         done = simulated_run(name, rig, seed, {**QUICK.get(name, {}), **switches}, path, truth, known)
         if name != procedure:
@@ -138,6 +141,7 @@ def errors(done: Simulated) -> dict[str, tuple[float, Measured]]:
 class Sound:
     """A run with nothing moved: its results' errors, and their U."""
 
+    rig: str
     run: Simulated
     base: Mapping[str, tuple[float, Measured]]
     wide: Mapping[str, float]
@@ -147,12 +151,12 @@ class Sound:
         """On the rig of a seed."""
         run = attempt(procedure, rig, seed, {}, folder)
         base = errors(run)
-        return cls(run, base, {key: interval(m.estimate, seed).U for key, (_, m) in base.items()})
+        return cls(rig, run, base, {key: interval(m.estimate, seed).U for key, (_, m) in base.items()})
 
     def shifts(self, name: str, value: float, folder: Path) -> dict[str, tuple[float, float]] | str:
         """By result with a number moved its shift in U of this run and its error in its own U, or what caught it."""
         try:
-            done = attempt(self.run.procedure.name, self.run.recording.rig.name, self.run.seed, {name: value}, folder)
+            done = attempt(self.run.procedure.name, self.rig, self.run.seed, {name: value}, folder)
         except BenchError as error:
             return str(error)
         if found := serious(done):
@@ -216,11 +220,14 @@ def main() -> int:
         help="every procedure, or those named; the lines go to a file, what it has is not done again",
     )
     parser.add_argument("--seed", type=int, default=5)
+    parser.add_argument("--rig", help="this one alone")
     asked = parser.parse_args()
     lines = [json.loads(x) for x in asked.all.read_text().splitlines()] if asked.all and asked.all.exists() else []
     done = {(e["rig"], e["procedure"], e["name"]) for e in lines}
-    for rig, procedures in RIGS.items():
+    for rig, procedures in {**RIGS, **TWINS}.items():
         for procedure in procedures:
+            if asked.rig and asked.rig != rig:
+                continue
             if procedure not in asked.procedures and (asked.procedures or not asked.all):
                 continue
             load(procedure)
@@ -229,7 +236,7 @@ def main() -> int:
                 for line in moved(procedure, rig, asked.seed, left, Path(folder)) if left else ():
                     lines.append(asdict(line))
                     print(
-                        f"{line.rig:13} {line.procedure:18} {line.name:34} {line.end:8} {line.shift:6.2f} U, "
+                        f"{Path(line.rig).stem:13} {line.procedure:18} {line.name:34} {line.end:8} {line.shift:6.2f} U, "
                         f"{line.own:5.2f} of its own {line.result} {line.told[:90]}"
                     )
                     if asked.all:

@@ -14,7 +14,7 @@ from bench.findings import Effect, Finding
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.units import RPM
-from procedures.balance import decision, estimates, planes
+from procedures.balance import apart, decision, estimates, planes
 from procedures.balance.estimates import Balanced
 from procedures.balance.plan import Plan
 from procedures.balance.steps import (
@@ -103,6 +103,11 @@ def of_result(balance: Balanced, recorded: Recorded, shown: list[Run], plan: Pla
         text = (f"the condition of the influence coefficients is {balance.solved.condition:.0f}: the probes do not tell the "
                 "planes apart.")  # fmt: skip
         yield Finding("planes-not-told-apart", text, "", Effect.ERROR)
+    base = balance.trials.base
+    if base.name in balance.unbalance:
+        read = estimates.readings(base) / balance.gain
+        speeds = [r.speed for r in base.reads]
+        yield from apart.parts_apart(balance.solved, read, speeds, balance.unbalance[base.name], balance.planes)
     for before, after in pairwise(shown):
         if after.name.startswith("check"):
             yield from predicted(balance, before, after, rig)

@@ -20,7 +20,7 @@ from procedures.amb_rotor.lengths import lengths_by_name
 from procedures.balance import scatter as balance_scatter
 from procedures.balance.plan import Plan
 from procedures.balance.planes import Planes, all_told, names_of, planes_of
-from procedures.balance.solution import Solved, Trials, runout_as_unbalance, solve
+from procedures.balance.solution import Solved, Trials, runout_as_unbalance, runout_beside, solve
 from procedures.balance.steps import Read, Recorded, Run, Weight, read_dwell
 from procedures.balance.vector_length import amount
 from procedures.shared.certificates import certified
@@ -42,7 +42,7 @@ NONLINEAR = 3.0  # of (X/gap)^2
 @dataclass(frozen=True)
 class Balanced:
     """Nominal solution; of each run the unbalance by plane as `vectors` (2,) kg m on the planes' scales and its `parts` re, im
-    by plane (4,); U_per of each plane, kg m; the `planes`."""
+    by plane (4,); U_per of each plane, kg m; the `planes`; `gain` (4,) of the probes."""
 
     trials: Trials
     solved: Solved
@@ -50,6 +50,7 @@ class Balanced:
     parts: Mapping[str, tuple[Estimate, ...]]
     permissible: tuple[Estimate, Estimate]
     planes: Planes
+    gain: Array
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,7 @@ def solve_runs(
         bent = np.stack([v[f"nonlinear_re_{p}"] + 1j * v[f"nonlinear_im_{p}"] for p in (0, 1)], axis=-1)
         out: dict[str, Array] = {}
         for run in runs:
-            read = _readings(run) / s.gain[:, None]
+            read = readings(run) / s.gain[:, None]
             u = found.unbalance(read) + replace(found, taken=0 * found.taken).unbalance(read) * bent
             u = all_told(planes, u, (v["scale_0"], v["scale_1"]))
             out |= {f"{run.name}/{k}": x for k, x in enumerate(u.view(np.float64).T)}
@@ -112,7 +113,7 @@ def solve_runs(
             for e, more in zip((out[f"{run.name}/{k}"] for k in range(4)), scatter, strict=True)
         )
     unbalance = {name: _vectors(p) for name, p in parts.items()}
-    return Balanced(trials, nominal, unbalance, parts, permissible_of_planes(rig, plan), planes)
+    return Balanced(trials, nominal, unbalance, parts, permissible_of_planes(rig, plan), planes, stand.gain)
 
 
 def _solve_with(v: Mapping[str, Any], slow: Read | None, trials: Trials, near: Array) -> tuple[Stand, Solved]:
@@ -122,8 +123,9 @@ def _solve_with(v: Mapping[str, Any], slow: Read | None, trials: Trials, near: A
     some = [(_fixed(v, trials.planes, p), _turnings(trials.before[p]), _turnings(trials.having[p])) for p in (0, 1)]
     found = solve(s, None if slow is None else slow.turning, some, _turnings(trials.base))
     if slow is None:
-        lost = runout_as_unbalance(s, _turnings(trials.base), _unknown(v), found.mark)
-        found = replace(found, taken=found.taken + lost)
+        lost = (s, _turnings(trials.base), _unknown(v), found.mark)
+        beside = found.beside + runout_beside(*lost, found.influence)
+        found = replace(found, taken=found.taken + runout_as_unbalance(*lost), beside=beside)
     bent = runout.matrix([[v[f"bending_{j}{k}"] for k in (0, 1)] for j in (0, 1)])
     return s, replace(found, taken=found.taken + near[:, None] * (found.taken @ bent.mT))
 
@@ -137,7 +139,7 @@ def _turnings(run: Run) -> list[Turning]:
     return [r.turning for r in run.reads]
 
 
-def _readings(run: Run) -> Complex:
+def readings(run: Run) -> Complex:
     return np.array([r.vectors.values[:4] for r in run.reads])
 
 
@@ -166,7 +168,7 @@ def _bending() -> dict[str, Estimate]:
 def _nonlinear(trials: Trials, rig: RigFile) -> dict[str, Estimate]:
     """How far influence coefficients may be those of another amplitude: forces go as 1/gap^2, so that what the runs with trial
     weights say of the slope differs from that of a shaft at rest by some (X/gap)^2, X the greatest amplitude in them."""
-    far = max(float(np.abs(_readings(r)).max()) for r in (*trials.before, *trials.having))
+    far = max(float(np.abs(readings(r)).max()) for r in (*trials.before, *trials.having))
     u = NONLINEAR * (far / facts.least_gap(rig)) ** 2
     return {
         f"nonlinear_{part}_{p}": Estimate.of(

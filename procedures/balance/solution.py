@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from procedures.balance.loop import beside_unbalance
 from procedures.balance.planes import Planes
 from procedures.balance.steps import Run, Weight
 from procedures.synchronous import runout
@@ -42,7 +43,8 @@ class Trials:
 @dataclass(frozen=True)
 class Solved:
     """By speed `influence` (s, 4, 2) m/(kg m), probes over their gain, and `taken` (s, 2) kg m, the unbalance on the scale that
-    the runout is taken for; `placed` (2, 2), what the forces say at the highest speed of each trial weight (row) in each
+    the runout is taken for, and what the probes read of it `beside` that (s, 4) m; `placed` (2, 2), what the forces say at the
+    highest speed of each trial weight (row) in each
     plane, over what it should be; `mark` rad, from the scale's zero to the mark; `runout` (4,) m from the mark."""
 
     influence: Complex
@@ -50,6 +52,7 @@ class Solved:
     mark: Number
     runout: Complex
     taken: Complex
+    beside: Complex
 
     @property
     def condition(self) -> float:
@@ -59,7 +62,8 @@ class Solved:
 
     def unbalance(self, readings: Complex) -> Complex:
         """Unbalance (2,) kg m on the scale, from readings (s, 4) m over gain."""
-        a, clean = self.influence, readings - np.einsum("...spq,...sq->...sp", self.influence, self.taken)
+        a = self.influence
+        clean = readings - self.beside - np.einsum("...spq,...sq->...sp", a, self.taken)
         every = (*a.shape[:-3], -1)  # speed and probe
         return np.asarray(times(np.linalg.pinv(a.reshape(*every, 2)), clean.reshape(every)))
 
@@ -80,10 +84,18 @@ def solve(s: Stand, slow: Turning | None, trials: Sequence[Trial], base: Sequenc
     by_weight: Complex = np.stack(moved, axis=-2)
     mark = np.angle(np.trace(by_weight, axis1=-2, axis2=-1))
     placed = by_weight * np.exp(-1j * mark)[..., None, None]
-    return Solved(np.stack(influence, axis=-1), placed, mark, found, runout_as_unbalance(s, base, found, mark))
+    a = np.stack(influence, axis=-1)
+    taken, beside = runout_as_unbalance(s, base, found, mark), runout_beside(s, base, found, mark, a)
+    return Solved(a, placed, mark, found, taken, beside)
 
 
 def runout_as_unbalance(s: Stand, base: Sequence[Turning], off: Complex, mark: Number) -> Complex:
     """The unbalance by speed (s, 2) kg m on the scale that a runout `off` (4,) m is taken for."""
     back = np.exp(-1j * mark)[..., None]
     return np.stack([runout.as_unbalance(s, t.means, off, t.speed) * back for t in base], axis=-2)
+
+
+def runout_beside(s: Stand, base: Sequence[Turning], off: Complex, mark: Number, influence: Complex) -> Complex:
+    """What the probes read beside that by speed (s, 4) m, `influence` (s, 4, 2) m/(kg m) on the scale."""
+    a = influence * np.exp(-1j * mark)[..., None, None, None]
+    return np.stack([beside_unbalance(s, t, off, a[..., k, :, :]) for k, t in enumerate(base)], axis=-2)

@@ -56,10 +56,13 @@ def before(recording: Recording[Any]) -> Iterator[Finding]:
 
 def of_steps(steps: Sequence[Done], plan: Plan) -> Iterator[Finding]:
     """Signals, speed, and whether the step that was asked for is the step that came."""
+    coarse = list(_resolved(steps))
     yield from _signals(steps, plan)
+    if not coarse:  # in one sample a rise the currents have turned round before they are seen
+        yield from _kicks(steps)
     yield from _speed(steps, plan)
     yield from _came(steps)
-    yield from _resolved(steps)
+    yield from coarse
     yield from _apart(steps)
 
 
@@ -154,7 +157,6 @@ def _speed(steps: Sequence[Done], plan: Plan) -> Iterator[Finding]:
         yield Finding("not-at-rest", f"before {len(moving)} of {len(steps)} steps the position still moved, by {fastest:.2f} "
                       "µm/s: wait longer (record_s between steps, settle_s before the first), or start warm.",
                       moving[0].case.where, Effect.INDETERMINATE, touched(moving, steps))  # fmt: skip
-    yield from _kicks(steps)
     for d in steps:
         if d.case.speed == 0 and d.speeds[1] > 2:
             yield Finding("turns-at-rest", f"the shaft turned at {d.speeds[1]:.1f} rad/s in a step that was to be done at rest",

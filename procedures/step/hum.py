@@ -33,12 +33,13 @@ MATTERS = 0.5  # of an overshoot's U: less moves nothing that is told
 def find_hum(steps: Sequence[Done], results: Mapping[Case, Result]) -> Iterator[Finding]:
     """A finding for each group of steps whose overshoot a line at rest moves by more than MATTERS of its U."""
     groups = by_group(list(steps))
-    poles = np.concatenate([NO_POLES, *(shared_poles([r for c, r in results.items() if c.group == g]) for g in groups)])
+    own = {g: shared_poles([r for c, r in results.items() if c.group == g]) for g in groups}
     for group, of in groups.items():
         doubts = [interval(r.estimates["overshoot"]).U * c.size for c, r in results.items()
                   if c.group == group and "overshoot" in r.estimates]  # fmt: skip
         turned = [n * float(np.mean([d.speeds for d in of])) / (2 * np.pi) for n in ORDERS]
-        hz, amplitude = line([d.rest for d in of], float(np.median(np.diff(of[0].t))), poles, turned)
+        rests, period = [d.rest for d in of], float(np.median(np.diff(of[0].t)))
+        hz, amplitude = surest(rests, period, (own[group], np.concatenate([*own.values()])), turned)
         if doubts and amplitude > MATTERS * min(doubts):
             text = (f"while the shaft rests before the steps its position swings by {amplitude * 1e6:.2g} µm at {hz:.3g} Hz: "
                     "mains hum in probes or cables, or something that shakes the stand; and so do the responses.")  # fmt: skip
@@ -54,6 +55,15 @@ def shared_poles(results: Sequence[Result]) -> Complex:
         return found
     near = np.stack([(np.abs(found[:, None] - s) < NEAR * np.abs(found[:, None])).any(axis=1) for s in swings])
     return np.asarray(found[2 * near.sum(axis=0) >= len(swings)])
+
+
+def surest(
+    rests: Sequence[Array], period: float, hills: Sequence[Complex], orders: Sequence[float] = ()
+) -> tuple[float, float]:
+    """`line` where it is one above each of `hills`, sets of poles: of a loop that swings at one frequency along y and at another
+    along z, the flank of one was taken for a line beside the hill of the other."""
+    told = {line(rests, period, poles, orders) for poles in hills}
+    return next(iter(told)) if len(told) == 1 else (0.0, 0.0)
 
 
 def line(

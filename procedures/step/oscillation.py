@@ -49,14 +49,24 @@ class Swing:
     def pole(self) -> complex:
         """The mean of the poles that oscillate as the one that carries most does, each with its part, 1/s; nan where none does.
         What else was fitted (slower than SLOW_HZ, faster than FAST_HZ, or hardly swinging) is an integrator or a filter."""
-        size = np.abs(self.poles) / (2 * np.pi)
-        swings = (size > SLOW_HZ) & (size < FAST_HZ) & (-self.poles.real < HARD * np.abs(self.poles))
+        swings = self._swings
         if not swings.any():
             return complex(np.nan)
         lead = self._lead(swings)
         swings &= np.abs(self.poles - lead) < OF_ITS_OWN * np.abs(lead)
         whole = self.parts[swings].sum()
         return complex((self.parts * self.poles)[swings].sum() / whole) if whole else complex(np.nan)
+
+    @property
+    def lasting(self) -> float:
+        """Greatest time constant of what oscillates, s; 0 where nothing does, or does not die away."""
+        fading = -self.poles.real[self._swings]
+        return float(1 / fading.min()) if len(fading) and fading.min() > 0 else 0.0
+
+    @property
+    def _swings(self) -> npt.NDArray[np.bool_]:
+        size = np.abs(self.poles) / (2 * np.pi)
+        return (size > SLOW_HZ) & (size < FAST_HZ) & (-self.poles.real < HARD * np.abs(self.poles))
 
     def _lead(self, of: npt.NDArray[np.bool_]) -> complex:
         """The pole among them that carries most."""

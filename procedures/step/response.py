@@ -19,7 +19,8 @@ from procedures.step.oscillation import One, Swing
 Array = npt.NDArray[np.float64]
 FINE = 20  # points of the curve in a telemetry period
 RAW_S = 8e-3  # until then the bandwidth is that of the samples, from then on of the oscillation that was fitted to them
-LENGTH_S = 0.12  # of the response that makes the bandwidth
+LENGTH_S = 0.12  # of the response that makes the bandwidth, at least
+LASTS = 7.0  # time constants of its slowest oscillation: what is cut off behind them is 0.1 % of a swing
 SCAN_HZ = np.arange(20.0, 480.0, 2.0)
 
 
@@ -81,7 +82,7 @@ def bandwidth(steps: Sequence[One], swing: Swing) -> float:
     """Hz where the gain from set point to position first falls below 0.707, by the steps' mean; infinite beyond the scan. A
     bending mode far above may lift it again: that is no band in which the shaft follows."""
     period = float(steps[0].t[1] - steps[0].t[0])
-    count = round(LENGTH_S / period)
+    count = round(max(LENGTH_S, LASTS * swing.lasting) / period)
     turns = np.exp(-2j * np.pi * period * np.outer(SCAN_HZ, np.arange(count)))
     gain = np.zeros(len(SCAN_HZ), complex)
     for s in steps:

@@ -115,7 +115,8 @@ def _solved(s: Stand, readings: Sequence[Reading], vectors: Complex, rounds: int
     runout, left = np.zeros((1, 4), complex), np.zeros(1)
     done: npt.NDArray[np.bool_] = np.zeros(1, bool)
     for _ in range(rounds):
-        terms, left = _least_squares(*_system(s, readings, vectors, runout))
+        with np.errstate(invalid="ignore"):  # a guess that has run away is NaN and stays it
+            terms, left = _least_squares(*_system(s, readings, vectors, runout))
         runout, old = terms[:, 4:12].view(complex), s.beta[:, 0]
         step = np.clip(terms[:, :4], -0.5 * np.abs(old), 0.5 * np.abs(old))
         new = np.where(done[:, None], old, old + step)

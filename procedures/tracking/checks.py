@@ -16,6 +16,7 @@ from procedures.shared.sines import known_frequency, unknown_frequency
 from procedures.tracking.drift import Drift, drift
 from procedures.tracking.estimates import TIMING_TICKS
 from procedures.tracking.plan import Plan
+from procedures.tracking.points import written_apart
 from procedures.tracking.requires import upper_and_lower
 from procedures.tracking.steps import Orbit
 
@@ -33,6 +34,7 @@ APPLIED, OFF_HZ = 0.3, 2e-3  # share of the amplitude, relative error of the fre
 CLEAR = 8.0  # jump of the current at the start, over the noise of a sample
 HELD = 5  # samples in a row at an extreme: a sensor that clips
 STEADY = 0.01  # of the speed
+APART_RAD = 1e-3  # of the reference: half of what phases are known to
 PARTS = 0.02  # share of samples at a limit that a smooth reference does not explain
 
 
@@ -126,7 +128,9 @@ def _of_points(o: Orbit) -> Iterator[Finding]:
     """Does the shaft go where the set points are, each axis along its own?"""
     facts, wave = nominal(o.step.recording.rig, o.t_0), o.path.wave
     if o.clear < CLEAR:
-        text = f"the coil currents show no answer to set points ({o.clear:.1f} times their noise): their delay is not known."
+        text = (f"the coil currents show no answer to set points ({o.clear:.1f} times their noise): their delay is not known. "
+                "Steps of the reference are larger with fewer points or a larger ellipse (y_m, z_m); else suspect the current "
+                "sensors of one bearing to be exchanged, so that the answers cancel.")  # fmt: skip
         yield Finding("start-not-seen", text, o.where, Effect.ERROR)
     q, t = centre(o.path.readings, facts)[:2], o.path.t - o.path.t[0]
     own = [known_frequency(t, x, wave.hz).amplitude for x in q]
@@ -136,6 +140,18 @@ def _of_points(o: Orbit) -> Iterator[Finding]:
         yield Finding("reference-missing", text, o.where, Effect.ERROR)
     else:
         yield from _of_probes(o)
+        yield from _of_writes(o)
+
+
+def _of_writes(o: Orbit) -> Iterator[Finding]:
+    """Set points of one place that were written apart: the shaft goes an ellipse of its own, and tilts, by as much."""
+    names = [*o.machine.points({"y": 0.0, "z": 0.0})]
+    apart, hz = written_apart(o.step, names), o.path.wave.hz
+    if 2 * math.pi * hz * apart > APART_RAD:
+        text = (f"the set points of one place were written up to {apart * 1e3:.2g} ms apart, {360 * hz * apart:.2g}° of a "
+                f"revolution at {hz:g} Hz: the shaft followed one, then the other. Bind them to signals of one message, which "
+                "the bench writes at once, or go slower (points_hz).")  # fmt: skip
+        yield Finding("set-points-apart", text, o.where, Effect.INDETERMINATE, (f"@{o.where}",))
 
 
 def _of_probes(o: Orbit) -> Iterator[Finding]:

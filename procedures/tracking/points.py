@@ -11,6 +11,7 @@ each over its size, lie on one curve, whose begin is that delay.
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +23,7 @@ from procedures.amb_rotor.machine import AmbRotor
 from procedures.amb_rotor.onset import onset
 
 Array = npt.NDArray[np.float64]
-POINT = "reference-point"
+POINT, ORBIT_LOST = "reference-point", "orbit-lost"
 FINE = 2000  # points of the ellipse that are looked at
 LARGE = 0.5  # of the greatest step: those whose answers are looked at
 RESTS = 4  # samples before a step that it is counted from
@@ -53,6 +54,18 @@ def read_points(step: Step, origin: int) -> Points | None:
         return None
     t, y, z = np.array([((e["t_ns"] - origin) * 1e-9, e["y"], e["z"]) for e in found]).T
     return Points(t, y, z)
+
+
+def written_apart(step: Step, names: Collection[str]) -> float:
+    """From the first to the last write of the set points `names` of one point of an orbit, s, at its longest."""
+    writes = [
+        e for e in step.recording.events("parameter") if e["name"] in names and step.start_ns <= e["t_ns"] < step.end_ns
+    ]
+    at = np.array([e["t_ns"] for e in writes], dtype=np.int64)
+    begins = np.array([e["t_ns"] for e in step.recording.events(POINT)], dtype=np.int64)
+    of = np.searchsorted(begins, at, side="right")
+    spans = [float(np.ptp(at[of == k])) * 1e-9 for k in np.unique(of[of > 0])]
+    return max(spans, default=0.0)
 
 
 def delay(

@@ -88,7 +88,8 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
             rig.clock.sleep(plan.settle_s)
             labels = {"law": law, "judged": law in plan.judged, "hz": plan.points_hz, "y_m": half_y, "z_m": half_z,
                       "speed_rad_s": 0.0, "ratio": 1}  # fmt: skip
-            by_points.follow(rig, plan, record, labels, ORBIT)
+            if not by_points.follow(rig, plan, record, labels, ORBIT):
+                return
         lift.write(rig, conventions(rig.file).select(conventions(rig.file).plain_law))
         return
     _start(rig, plan, record)
@@ -160,10 +161,11 @@ class Results:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     """Errors, tilts and distances of each law's orbit."""
-    from procedures.tracking import checks, estimates
+    from procedures.tracking import checks, estimates, lost
 
     first_look.gate(recording, findings, wiring.before_orbits(recording))
     findings.gate(wiring.before_orbits(recording))
+    findings.gate(lost.of_lost_orbit(recording))
     plan, orbits = recording.plan, read_orbits(recording)
     findings.gate(checks.of_signals(orbits, plan), checks.FATAL)
     by_law = estimates.by_law(orbits, recording.rig, plan.runout_m)

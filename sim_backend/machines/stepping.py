@@ -23,7 +23,11 @@ DECIMATED_S, ROWS, ORDER = 4e-4, 60, 12  # of the identification: between sample
 BEGIN_S, LENGTH_S = 6e-4, 0.1  # of the record that it is made of
 SLOW_HZ, FAST_HZ, DAMPED = 15.0, 250.0, 0.95  # of the rigid modes: slower are integrators, faster filters and bending
 OF_ITS_OWN = 0.75  # of the pole that carries most: what lies farther from it is another oscillation
-SWING_S, BAND_S = 0.08, 0.25  # of the first swing; of the response that makes the bandwidth
+SWING_S, BAND_S = (
+    0.08,
+    (0.25, 0.5, 1.0),
+)  # of the first swing; of the response that makes the bandwidth: the first that is calm
+CALM = 0.01  # of the step, over the last fifth of it
 SCANNED = 40  # the first line of the response that is looked at: 20 Hz, where the procedure begins
 PHASES = 3  # of the revolution, at which steps begin: what goes with one or two a turn has no mean
 COORDINATES = "yzx"
@@ -70,7 +74,9 @@ class Shown:
     @property
     def bandwidth(self) -> float:
         """Where the spectrum of the response's derivative first falls below 0.707, Hz: a bending mode may lift it again."""
-        y = self.y[: round(BAND_S / self.tick_s)]
+        ends = [round(s / self.tick_s) for s in BAND_S if s <= len(self.y) * self.tick_s] or [len(self.y)]
+        calm = [n for n in ends if np.ptp(self.y[n - n // 5 : n]) < CALM]
+        y = self.y[: (*calm, ends[-1])[0]]
         count = round(1 / (0.5 * self.tick_s))  # zeros behind, for lines 0.5 Hz apart
         gain = np.abs(np.fft.rfft(np.diff(y, prepend=y[0]), count))[:1000]
         above = gain >= math.sqrt(0.5)
