@@ -260,4 +260,4 @@ def balance_forces(d: Dwell, off: Complex, rig: RigFile, known: Known) -> ForceB
     s = Stand.of({name: e.value for name, e in inputs.items()})
     _, misfit = runout.unbalances(s, read.turning, off)
     may = allowed(misfit, d, inputs, [Estimate.exact(float(x), "m") for x in off.view(float)])
-    return ForceBalance(d, misfit, may, carried(rig, s, read.means))
+    return ForceBalance(d, misfit, may, carried(rig, inputs, read.means))

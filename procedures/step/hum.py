@@ -60,8 +60,8 @@ def shared_poles(results: Sequence[Result]) -> Complex:
 def surest(
     rests: Sequence[Array], period: float, hills: Sequence[Complex], orders: Sequence[float] = ()
 ) -> tuple[float, float]:
-    """`line` where it is one above each of `hills`, sets of poles: of a loop that swings at one frequency along y and another along
-    z, the flank of one was taken for a line beside the hill of the other."""
+    """`line` where it is one above each of `hills`, sets of poles: where a loop swings at one frequency along y and at another
+    along z, the flank of one was taken for a line beside the hill of the other."""
     told = {line(rests, period, poles, orders) for poles in hills}
     return next(iter(told)) if len(told) == 1 else (0.0, 0.0)
 

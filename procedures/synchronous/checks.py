@@ -15,12 +15,12 @@ from bench.findings import Effect, Finding
 from bench.recording import Recording
 from bench.units import RPM
 from procedures.shared import signals
+from procedures.synchronous.carrying import CARRIED
 from procedures.synchronous.dwells import DWELL, SLOW, Dwell
 from procedures.synchronous.estimates import ForceBalance, Results
 from procedures.synchronous.fitting import PER_TURN, too_fast
 
 HELD = 8  # samples in a row at an extreme: a probe that clips
-CARRIED = 0.5  # of the share of the weight that an axis should carry: how far its coils may be off
 BESIDE = 0.05  # of the least clearance: motion that does not turn with the shaft
 CHANGED, CHANGED_M = 0.1, 0.3e-6  # of the vector, and at least: a repeat that differs by more
 ZONES = (("A", 0.3), ("B", 0.4), ("C", 0.5), ("D", math.inf))

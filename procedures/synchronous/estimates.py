@@ -198,7 +198,7 @@ def _result(
         out |= coil_peaks.peaks(d, inputs, plane, rig)
     out["reading", ""] = _reading(d, inputs)
     may = allowed(misfit, d, inputs, runouts[1.0].parts)
-    forces = ForceBalance(d, misfit, may, carried(rig, nominal, d.means))
+    forces = ForceBalance(d, misfit, may, carried(rig, inputs, d.means))
     return Result(d, vectors, orbits, centres, forces, u, beside, folded, out)
 
 

@@ -1,4 +1,4 @@
-"""Runout on a loop that is not the same along the load and across it: what no unbalance reads like; parts of a run that differ."""
+"""Runout on a loop that is not the same along the load and across it: what no unbalance reads like; parts that say another."""
 
 from __future__ import annotations
 
