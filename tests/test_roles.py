@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,8 @@ from bench.rigfile.roles import (
     Status,
     answered,
     bits,
-    edge_round_ns,
+    edge_round_s,
+    exact,
     read_now,
     resolved,
     untold,
@@ -130,7 +132,7 @@ def test_an_edge_is_as_old_as_both_clocks_say_however_often_they_came_round() ->
     """Ticks of 50 us in 24 bits, an edge in whole microseconds of 32 bits: after two hours the one came round eight times, the
     other once, and what was unwrapped since a bench listens began at no round. By hand: they share 2^25 us."""
     spindle = load_rig(SPINDLE)
-    assert edge_round_ns(spindle) == 2**25 * 1000
+    assert edge_round_s(spindle) == 2**25 * 1e-6
     assert whole_channels(spindle) == {"MarkTime"}
     assert not whole_channels(rig()) | whole_channels(rig(name="tsbs12"))
     ticks = np.arange(144_000_000, 144_000_400, 10)  # two hours
@@ -142,3 +144,25 @@ def test_an_edge_is_as_old_as_both_clocks_say_however_often_they_came_round() ->
         assert np.abs(said[AGE] - ages).max() < 1.01e-6
     late = answered(spindle, (AGE,), {"MarkTime": ticks[:1] * 5e-5 % (2**32 * 1e-6) + 1e-6, TICKS: ticks[:1]})
     assert late[AGE][0] == pytest.approx(-1e-6, abs=1e-8)
+
+
+def test_a_tick_that_is_no_whole_number_of_nanoseconds_lets_no_age_drift() -> None:
+    """15 kHz: by ticks of 66667 ns an edge was 0.2 ms too old after 40 s, and a vector at 6800 r/min 0.15 rad off.
+    By hand: ticks of 24 bits and an edge of 32 bits share 2^26/1.5 us."""
+    spindle = load_rig(SPINDLE)
+    controller = spindle.devices["controller"].model_copy(update={"tick_s": 6.666666666666667e-5})
+    fast = spindle.model_copy(update={"devices": {**spindle.devices, "controller": controller}})
+    assert edge_round_s(fast) == pytest.approx(2**26 / 1.5e6)
+    ticks = np.arange(0, 15000 * 600, 9970)  # ten minutes
+    ages = np.linspace(0.0, 0.49, ticks.size)
+    edge = np.floor((ticks / 15000 - ages) * 1e6) * 1e-6 % (2**32 * 1e-6)
+    for heard in (ticks, ticks + 5 * 2**24):
+        said = answered(fast, (AGE,), {"MarkTime": edge, TICKS: heard.astype(np.uint64)})[AGE]
+        assert np.abs(said - ages).max() < 1.01e-6
+
+
+def test_a_time_is_the_share_of_a_second_that_its_digits_stand_for() -> None:
+    assert exact(6.666666666666667e-5) == exact(6.666666667e-5) == Fraction(1, 15000)
+    assert exact(5e-5) == Fraction(1, 20000)
+    assert exact(1.04e-4) == Fraction(104, 10**6)
+    assert exact(6.6667e-5) == Fraction(66667, 10**9)

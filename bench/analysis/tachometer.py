@@ -28,13 +28,24 @@ ROUNDED_RAD = 1e-3  # an angle so little under a whole turn is a pulse that has 
 
 
 @dataclass(frozen=True)
+class Fresh:
+    """The `least` and the `most` age of a pulse at the first sample that counts it; the samples are `apart`. All in s."""
+
+    least: float
+    most: float
+    apart: float
+
+
+@dataclass(frozen=True)
 class Tachometer:
-    """Pulse times (m,) s and the turn each begins (m,); times of pulses found `missing` and `doubled`, which are left out."""
+    """Pulse times (m,) s and the turn each begins (m,); times of pulses found `missing` and `doubled`, which are left out.
+    `fresh`: how old they were when they were counted, where that was looked at."""
 
     times: Array
     turns: Integers
     missing: tuple[float, ...] = ()
     doubled: tuple[float, ...] = ()
+    fresh: Fresh | None = None
 
     @property
     def sound(self) -> bool:
@@ -125,6 +136,14 @@ def counted(t: npt.ArrayLike, count: npt.ArrayLike, age: npt.ArrayLike, wraps: i
         times.append(last)
         numbers.append(int(total[k]))
     return np.array(times), np.array(numbers, np.int64)
+
+
+def fresh(t: npt.ArrayLike, count: npt.ArrayLike, age: npt.ArrayLike) -> Fresh | None:
+    """Ages of the pulses that came between two neighbouring samples, at the second of these; None where there are none."""
+    at, since = np.diff(np.asarray(t, np.float64)), np.asarray(age, np.float64)[1:]
+    apart = float(np.median(at)) if at.size else 0.0
+    new = (np.diff(np.asarray(count, np.float64)) == 1) & (at < 1.5 * apart)
+    return Fresh(float(since[new].min()), float(since[new].max()), apart) if new.any() else None
 
 
 def age(angle: npt.ArrayLike, speed: npt.ArrayLike) -> Array:

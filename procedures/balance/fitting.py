@@ -12,7 +12,6 @@ from procedures.balance.plan import Plan
 from procedures.synchronous import fitting
 
 MOST_RPM = 10000.0  # influence runs
-RATE_HZ = 1e4  # of the captures, the controller's own; order 1 alone is read
 SAME_PLACE_RAD = math.radians(0.1)
 
 
@@ -21,7 +20,8 @@ def of_plan(rig: RigFile, plan: Plan) -> Iterable[str]:
     yield from fitting.of_speeds(rig, plan.speeds_rad_s)
     yield from fitting.of_slow_roll(rig, plan.slow_rad_s, plan.slow_s, plan.speeds_rad_s)
     yield from fitting.of_bearings(rig, plan.slow_rad_s, len(plan.speeds_rad_s))
-    yield from fitting.of_captures(rig, plan.capture_s, RATE_HZ, 1, plan.speeds_rad_s)
+    own_hz = 1 / rig.devices["controller"].tick_s  # of the captures; order 1 alone is read
+    yield from fitting.of_captures(rig, plan.capture_s, own_hz, 1, plan.speeds_rad_s)
     if max(plan.speeds_rad_s) * RPM > MOST_RPM + 1:
         top = max(plan.speeds_rad_s) * RPM
         yield f"speeds_rad_s: found {top:.0f} r/min; influence runs are made at {MOST_RPM:.0f} r/min or below"

@@ -20,7 +20,7 @@ from procedures.run_up.hum import of_peaks
 from procedures.run_up.plan import Passing
 from procedures.run_up.steps import MISSED, PASSAGE, Passage, passed
 from procedures.shared import signals
-from procedures.synchronous import checks, facts
+from procedures.synchronous import checks, facts, mark
 from procedures.synchronous.checks import HELD
 from procedures.synchronous.hum import listen, of_dwells
 
@@ -47,6 +47,7 @@ def of_passage(p: Passage, recording: Recording[Any], plan: Passing) -> Iterator
     for name in p.stuck:
         yield Finding("stuck-channel", f"{name} does not move at all; a live sensor has noise.", name, Effect.ERROR)
     yield from _pulses(p)
+    yield from mark.of_clock([p.tacho], p.sampling.tick, p.name)
     yield from _limits(p, plan)
     yield from _silent(p, recording.rig, plan)
     for event in recording.events(MISSED):

@@ -15,6 +15,7 @@ from bench.findings import Effect, Finding
 from bench.recording import Recording
 from bench.units import RPM
 from procedures.shared import signals
+from procedures.synchronous import mark
 from procedures.synchronous.carrying import CARRIED
 from procedures.synchronous.dwells import DWELL, SLOW, Dwell
 from procedures.synchronous.estimates import ForceBalance, Results
@@ -55,6 +56,7 @@ def of_signals(
     for f in signals.losses(lost, expected, max_lost, lambda share: dwells[int(np.argmax(share))].where):
         hit = [doubts(d) for d in dwells if d.lost > max_lost * max(d.expected, 1)]
         yield replace(f, concerns=tuple(q for some in hit for q in some) if all(hit) else ())
+    yield from mark.of_clock([d.tacho for d in dwells], max(d.sampling.tick for d in dwells))
     for d in dwells:
         for name in d.stuck:
             yield Finding("stuck-channel", f"{name} does not move at all; a live sensor has noise.", name, Effect.ERROR)

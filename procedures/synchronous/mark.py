@@ -7,12 +7,14 @@ t it is 2 pi (t - t_edge) times the turns in a second, and more where the shaft 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
-from bench.analysis.tachometer import Tachometer, age, counted, tachometer
+from bench.analysis.tachometer import Tachometer, age, counted, fresh, tachometer
+from bench.findings import Effect, Finding
 from bench.rigfile import RigFile
 from bench.rigfile.roles import AGE, ANGLE, EDGE, PULSES, SPEED, is_bound, resolution_s, resolved, wraps_at
 
@@ -45,7 +47,23 @@ def tachometer_of(rig: RigFile, t: Array, data: Mapping[str, Array]) -> Tachomet
         tick = rig.devices["controller"].tick_s
         return tachometer(*counted(t - tick, data[PULSES], age(data[ANGLE], data[SPEED])))
     pulses = counted(t, data[PULSES], data[AGE], round(wraps_at(rig, resolved(rig, [PULSES])[0])))
-    return tachometer(*pulses, resolution_s(rig))
+    return replace(tachometer(*pulses, resolution_s(rig)), fresh=fresh(t, data[PULSES], data[AGE]))
+
+
+def of_clock(tachos: Sequence[Tachometer], tick_s: float, where: str = "") -> Iterator[Finding]:
+    """An edge that a sample of the telemetry counts first came since the sample before: by one clock no two of them differ in
+    age by more than the samples are apart, and by a tick where count and time are not read at once. Ticks that are not as long
+    as the rig file says let the ages drift, and every phase with them."""
+    seen = [tacho.fresh for tacho in tachos if tacho.fresh is not None]
+    if not seen:
+        return
+    least, most, apart = min(f.least for f in seen), max(f.most for f in seen), max(f.apart for f in seen)
+    if most - least > apart + tick_s:
+        text = (f"at the first sample that counts it an edge of the mark is {least * 1e6:.0f} to {most * 1e6:.0f} µs old, and "
+                f"samples are {apart * 1e6:.0f} µs apart: its time and the telemetry's ticks do not run alike, and every phase "
+                "drifts. Is devices.controller.tick_s told by all its digits (15 kHz: 6.666666666666667e-5), and does the "
+                "signal of mark.edge have the unit that the DBC says?")  # fmt: skip
+        yield Finding("mark-clock", text, where, Effect.ERROR)
 
 
 def angle_u(rig: RigFile, rad_s: float) -> float:

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from turning import Shaft
 
-from bench.analysis.tachometer import against, age, counted, edges, tachometer, wrapped
+from bench.analysis.tachometer import Fresh, against, age, counted, edges, fresh, tachometer, wrapped
 from bench.errors import AnalysisError
 
 
@@ -174,3 +174,11 @@ def test_fine_times_and_long_turns_stay_as_they_are() -> None:
     assert np.array_equal(tachometer(slow, None, 1e-5).times, slow)
     gaps = np.delete(numbers, slice(40, 400))
     assert np.abs(tachometer(times[gaps], gaps, 1e-5).times - times[gaps]).max() < 1e-5
+
+
+def test_ages_of_pulses_that_have_just_been_counted() -> None:
+    """Where a sample was lost, or two came at once, nothing is said of how old the last one may be."""
+    t = np.array([0.0, 1.0, 2.0, 3.0, 4.0, 7.0, 8.0])
+    seen = fresh(t, [4, 5, 5, 6, 8, 9, 9], [9.0, 0.3, 1.3, 0.8, 0.1, 2.9, 3.9])
+    assert seen == Fresh(0.3, 0.8, 1.0)
+    assert fresh(t, np.full(7, 4), np.zeros(7)) is None
