@@ -14,6 +14,8 @@ TERMS = ("K", "K2", "Kw")
 OUTPUTS = ("K_i", "K2_i", "Kw_i", "K_o", "K2_o", "Kw_o")
 """Of the servomotor, as `outputs` has them."""
 FLOOR = 1e-6  # of the greatest eigenvalue of the covariance between axes: the least
+SHARES = np.geomspace(1e-8, 1.0, 81)  # of the variance of the heaviest load that noise may be
+FREE = 1e-9  # of the greatest singular value: what is less is taken by the fits
 MOST_ALIKE = 0.999  # correlation between two axes
 
 
@@ -73,9 +75,10 @@ def _amounts(maps: Array, rest: Array, basis: Array) -> Array:
     for b in axes:
         expected, seen = (maps[b] * maps[b]) @ basis.T, rest[b] * rest[b]
         a, g = np.linalg.lstsq(expected, seen, rcond=None)[0]
-        if min(a, g) <= 0:  # a variance cannot be negative: keep the term that explains more
-            a, g = max((seen.sum() / expected[:, 0].sum(), 0.0), (0.0, seen.sum() / expected[:, 1].sum()),
-                       key=lambda ag: -float(((seen - expected @ np.array(ag)) ** 2).sum()))  # fmt: skip
+        if a <= 0 < g:
+            a, g = _likeliest(maps[b], rest[b], basis)
+        elif g <= 0:  # a variance cannot be negative
+            a, g = max(seen.sum() / expected[:, 0].sum(), 0.0), 0.0
         out[b, b] = a, g
     for b in axes:
         for c in range(b):
@@ -85,6 +88,22 @@ def _amounts(maps: Array, rest: Array, basis: Array) -> Array:
                 found = np.linalg.lstsq(expected, rest[b] * rest[c], rcond=None)[0]
                 out[b, c, both] = out[c, b, both] = np.clip(found, -bound[both], bound[both])
     return _possible(out)
+
+
+def _likeliest(to_rest: Array, rest: Array, basis: Array) -> tuple[float, float]:
+    """How much there is of noise and of what goes with the load, N^2, by the likelihood of the rest (restricted: of what no
+    fit can take). Where loads scatter by many times the noise, moments tell nothing of the noise, and a hanging without load
+    would be left without any: then the load means contradict each other, however little they differ."""
+    _, size, rows = np.linalg.svd(to_rest)
+    rows = rows[: int((size > FREE * size[0]).sum())]
+    z = rows @ np.linalg.lstsq(to_rest, rest, rcond=FREE)[0]
+    found = []
+    for share in SHARES:
+        covariance = (rows * (share * basis[0] + basis[1])) @ rows.T
+        g = float(z @ np.linalg.solve(covariance, z)) / z.size
+        found.append((-z.size * np.log(g) - np.linalg.slogdet(covariance)[1], g, share))
+    _, g, share = max(found)
+    return share * g, g
 
 
 def _possible(amounts: Array) -> Array:
