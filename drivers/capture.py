@@ -197,7 +197,10 @@ class ControllerCapture:
             )
 
     def _watched(self, trigger: Trigger) -> dict[str, float]:
-        code = self._rig.messages.code("CaptureArm", "trigger", trigger.kind)
+        try:
+            code = self._rig.messages.code("CaptureArm", "trigger", trigger.kind)
+        except KeyError as error:
+            raise BenchError(f"capture: {error.args[0]}: this controller does not wait for that") from error
         source = 0
         if trigger.kind in ("RISES", "FALLS"):
             source = next(iter(Layout.of(self._spec, (trigger.channel,)).channels.values())).index
