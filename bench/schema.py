@@ -13,7 +13,7 @@ from bench.errors import ConfigError
 STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 """Of what we write ourselves: no unknown key, no number for a text."""
 
-NAME = r"^[A-Za-z][\w-]*$"
+NAME = r"^[^\W\d_][\w-]*$"
 """What parts of a machine and the like may be called in a rig file."""
 
 
@@ -56,7 +56,7 @@ def expected_of(error: Mapping[str, Any]) -> str:
         case "string_too_short":
             return f"at least {_counted(count['min_length'], 'character', 'characters')}"
         case "string_pattern_mismatch" if count["pattern"] == NAME:
-            return "a name: a letter from A to Z, then letters, digits, _ or -"
+            return "a name: a letter, then letters, digits, _ or -"
     return str(error["msg"]).removeprefix("Input should be ").removeprefix("Value error, ").removeprefix("expected ")
 
 

@@ -57,7 +57,7 @@ from bench.rigfile.possible import normal_gravity
         ("lever_left =", "lever_lift =", "geometry.lever_lift", "did you mean lever_left?"),
         ("[machine]", "[calibration]\ninterval = 3\n[machine]", "calibration.interval", "no such key"),
         ("[hooks]\n", '[hooks]\n"à gauche" = { at = "geometry/hook_to_outboard" }\n', "hooks.à gauche",
-         "a name: a letter from A to Z"),
+         "a name: a letter, then letters"),
     ],
 )  # fmt: skip
 def test_one_mistake_is_named_with_its_key(tmp_path: Path, old: str, new: str, key: str, expected: str) -> None:

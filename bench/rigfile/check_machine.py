@@ -50,6 +50,7 @@ def _all(rig: RigFile) -> Iterator[Found]:
     yield from _channels(rig)
     yield from _axes(rig)
     yield from _motors(rig)
+    yield from _hooks(rig)
     yield from encoders_of(rig)
     yield from _certificates(rig)
     yield from _aliases(rig)
@@ -72,10 +73,26 @@ def _numbers(rig: RigFile, places: Places) -> Iterator[Found]:
             yield key, f"{term.identity} in {term.number.unit}", f"a unit of the kind of {KINDS[name]}"
         elif name in POSITIVE and term.factor * term.number.value <= 0:
             yield key, f"{term.factor * term.number.value:g} {term.number.unit}", "a positive number"
+        elif name == "friction" and not 0 <= term.number.value < 1:
+            yield key, f"{term.factor * term.number.value:g}", "0 to 1: the share of the weight that the pulley takes"
         elif (unlikely := _unlikely(name, term, by_reference=isinstance(stated, str))) and term.identity not in told:
             told.add(term.identity)
             found, expected = unlikely
             yield key, f"{term.identity}, {found}" if isinstance(stated, str) else found, expected
+        elif name in POSITIVE and term.identity not in told and _wide(term):
+            told.add(term.identity)
+            width = term.number.half_width or term.number.standard_uncertainty
+            found = f"{term.number.value:g} ± {width:g} {term.number.unit}"
+            yield key, found, "a tolerance that leaves it positive: look at the units of both"
+
+
+def _wide(term: Term) -> bool:
+    """Whether what is positive may be none by what it states: by half the width, or one standard uncertainty. Of a length of
+    [geometry] that is a slip of its unit that is told there."""
+    number, (table, _, entry) = term.number, term.identity.partition("/")
+    if table == "geometry" and beyond_likely(entry, number):
+        return False
+    return (number.half_width or number.standard_uncertainty) >= abs(number.value)
 
 
 def _unlikely(name: str, term: Term, *, by_reference: bool) -> tuple[str, str] | None:
@@ -108,6 +125,16 @@ def _stated(tree: Any, path: tuple[str, ...]) -> Iterator[tuple[str, str, Tolera
     elif hasattr(type(tree), "model_fields"):
         for name in type(tree).model_fields:
             yield from _stated(getattr(tree, name), (*path, name))
+
+
+def _hooks(rig: RigFile) -> Iterator[Found]:
+    """A mass pulls one way: down, to a side or along the shaft, the last two over a pulley."""
+    for name, hook in rig.hooks.items():
+        if hook.pull is not None and hook.along is not None:
+            yield f"hooks.{name}.along", f"{hook.along!r} beside a pull to the side", "one of both"
+        if hook.pulley is not None and hook.pull is None and hook.along is None:
+            yield (f"hooks.{name}.pulley", "one on a hook that pulls down",
+                   "`pull`, the direction in which it pulls, or `along` the shaft; or no pulley")  # fmt: skip
 
 
 def references_in(rig: RigFile) -> set[str]:

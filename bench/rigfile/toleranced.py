@@ -42,8 +42,8 @@ class Toleranced(Part):
                 unit = units.unit(data["unit"])
             except ConfigError as error:  # reported with its key and next to the other problems
                 raise PydanticCustomError(UNKNOWN_UNIT, "unknown unit", {"symbol": data["unit"]}) from error
-            scaled = {n: data[n] * unit.factor for n in ("u", "half_width") if isinstance(data.get(n), int | float)}
-            if isinstance(data.get("value"), int | float):
+            scaled = {n: data[n] * unit.factor for n in ("u", "half_width") if _number(data.get(n))}
+            if _number(data.get("value")):
                 scaled["value"] = data["value"] * unit.factor + unit.offset
             return {**data, **scaled, "unit": unit.si}
         return data
@@ -73,3 +73,7 @@ def simulated(value: Any) -> Any:
             Toleranced.model_validate(value) if "distribution" in value else {k: simulated(v) for k, v in value.items()}
         )
     return value
+
+
+def _number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
