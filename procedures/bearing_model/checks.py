@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
+from statistics import NormalDist
 
 import numpy as np
 
 from bench.findings import Effect, Finding
+from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence, coverage_factor, welch_satterthwaite
 from procedures.amb_rotor import magnetics
 from procedures.amb_rotor.keys import gap_key
 from procedures.amb_rotor.machine import AmbRotor
 from procedures.amb_rotor.places import Held
 from procedures.bearing_model.estimates import Analysis
+from procedures.bearing_model.inputs import as_printed
 from procedures.bearing_model.plan import Plan
 from procedures.shared import signals
 
@@ -30,6 +34,7 @@ FATAL = (
 )
 """Findings after which the numbers mean nothing: none is given."""
 CONTRADICTED = 4.0  # times its u may an adjustment be: one rig in some hundred by chance, of about fifty inputs
+FALSE_MISFIT = 1e-3  # of sound runs, in which noise alone may look like a misfit
 ALIKE = 0.9  # of the greatest: inputs that act alike are suspected together
 
 
@@ -102,6 +107,17 @@ def of_results(a: Analysis, plan: Plan) -> Iterator[Finding]:
         yield Finding("no-load", text, ", ".join(bare))
 
 
+def of_runout(rig: RigFile) -> Iterator[Finding]:
+    """A file that tells no runout leaves out what is by far the largest of an offset, and its interval."""
+    if not as_printed(rig) and rig.shaft is not None and rig.shaft.runout is None:
+        text = (
+            "the rig file does not tell the runout of what the probes look at (shaft.runout): offsets and their intervals "
+            "hold for the angle at which the shaft rested. Their means over a turn differ by what each probe reads of "
+            "runout there, a micrometre or two of a ground shaft. State it with its uncertainty."
+        )
+        yield Finding("runout-untold", text)
+
+
 def _compare(a: Analysis) -> Finding:
     """The linear model's two numbers beside the bearing's slopes, and the noise under both residual sums."""
     said = []
@@ -140,7 +156,7 @@ def _adjustments(a: Analysis, plan: Plan) -> Iterator[Finding]:
         if axis not in a.fits:
             continue
         load, left = float(np.abs(a.statics.force[k]).mean()), np.abs(a.adjusted.residuals[k])
-        if left.max() > plan.max_misfit * load:
+        if left.max() > max(plan.max_misfit * load, _by_noise(a, axis, plan)):
             text = (
                 f"axis {axis}: one position is {left.max() / load:.1%} of its load off the nonlinear model with everything "
                 f"adjusted ({plan.max_misfit:.1%} allowed), at {a.held.where(left)}. A position that was disturbed, or a "
@@ -161,6 +177,14 @@ def _adjustments(a: Analysis, plan: Plan) -> Iterator[Finding]:
         f"contradicted most is {_told(a, max(pulls, key=lambda n: abs(pulls[n])))}"
     )
     yield Finding("adjusted", text)
+
+
+def _by_noise(a: Analysis, axis: str, plan: Plan) -> float:
+    """What noise alone leaves of the greatest residual, N, in all but one run of a thousand: an axis that carries little has
+    more of it than half a per cent of its load. The noise is that of its batches, which says nothing of the model."""
+    tries = 2 * sum(a.adjusted.residuals[k].size for k, name in enumerate(a.held.machine.axes) if name in a.fits)
+    times = NormalDist().inv_cdf(1 - FALSE_MISFIT / tries)
+    return times * a.noise_N[axis][1] / math.sqrt(plan.batches)
 
 
 def _told(a: Analysis, name: str) -> str:

@@ -193,6 +193,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     findings.gate(first_look.with_first(recording, _of_data(recording, held, tilted)), checks.FATAL)
     a = estimates.evaluate(recording, held)
     findings.add(checks.of_results(a, recording.plan))
+    findings.add(checks.of_runout(recording.rig))
     findings.add(frame.describe(recording.rig, ("y", "z")))
     return a
 
