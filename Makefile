@@ -9,7 +9,7 @@ READY := .venv/.ready
 # Tests start hundreds of processes: without its bytecode every one of them would compile the project again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test check types bytecode format ci-long faults longer links browser pictures fuzz campaigns plants sound moved golden former bench clean lock setup wheel site gallery
+.PHONY: demo test check types bytecode format ci-long faults longer links browser pictures fuzz campaigns plants sound strangers moved golden former bench clean lock setup wheel site gallery
 
 demo: setup
 	$(BIN)/bench run amb-calibration --rig tsbs12 --seed 1
@@ -80,6 +80,11 @@ sound: setup
 	mkdir -p runs
 	nohup nice $(BIN)/python -m benchmarks.sound runs/sound-$(FIRST).jsonl --first $(FIRST) --count 60 --choices 20 --jobs 2 > runs/sound-$(FIRST).log 2>&1 &
 	@echo "look at it with: $(BIN)/python -m benchmarks.sound runs/sound-$(FIRST).jsonl --report"
+
+# Every procedure that the foreign rigs of the tests can run, with its default plan: what is wrong, what is beyond 3 U.
+strangers: setup
+	mkdir -p runs
+	nice $(BIN)/python -m benchmarks.sound runs/strangers.jsonl --first 0 --count 3 --jobs 2 $(addprefix --rig ,$(wildcard tests/strangers/*.toml))
 
 # Every drawn number moved by three half widths, for every procedure: caught, harmless, in the budget, or listed on the report.
 moved: setup

@@ -12,6 +12,7 @@ from typing import Any, Literal, get_args, get_origin
 from pydantic import ValidationError
 
 from bench import catalogue
+from bench.cli.abilities import abilities
 from bench.procedure import BenchPlan, Procedure
 from bench.rigfile import load_rig
 
@@ -113,6 +114,14 @@ def foreign_cases(rig: str, only: list[str]) -> Iterator[Case]:
             yield Case(rig, name, "{}", False)
         if needs and {*needed_by(name)} <= {*FOREIGN[rig]}:
             yield Case(rig, name, "{}", True)
+
+
+def able_cases(rig: str, only: list[str]) -> Iterator[Case]:
+    """The default plan of every procedure that a rig can run, of those that ask for no calibration."""
+    for ability in abilities(load_rig(rig)):
+        wanted = ability.able and (not only or ability.procedure in only)
+        if wanted and all(n.optional for n in load(ability.procedure).needs(load(ability.procedure).plan())):
+            yield Case(rig, ability.procedure, "{}", False)
 
 
 def plan_of(rig: str, procedure: Procedure, changes: Mapping[str, Any]) -> BenchPlan | None:

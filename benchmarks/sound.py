@@ -1,6 +1,7 @@
 """Sound virtual rigs with the plans that people run: each default plan alone and in the chain, and each choice of a plan.
 
     python -m benchmarks.sound runs/sound.jsonl --first 0 --count 60 --choices 20 --jobs 2
+    python -m benchmarks.sound runs/mine.jsonl --rig mine.toml --count 5
 
 Cases that the file holds already are left out, so that the same command goes on where it was stopped. `--report` prints what
 the file holds: how many runs of each case ended how, and every one that is not PASS or DONE with what is wrong about it.
@@ -32,7 +33,7 @@ from bench.record.outcomes import outcome_of
 from bench.record.records import Measurement, measurement, missing
 from bench.record.specs import applied, load_spec
 from bench.rigfile import load_rig
-from benchmarks.cases import FOREIGN, RIGS, TRUTH, Case, cases_of, foreign_cases, load, needed
+from benchmarks.cases import FOREIGN, RIGS, TRUTH, Case, able_cases, cases_of, foreign_cases, load, needed
 
 
 def main() -> None:
@@ -46,6 +47,13 @@ def main() -> None:
     parser.add_argument("--only", action="append", default=[], metavar="PROCEDURE")
     parser.add_argument(
         "--foreign", action="store_true", help="the rigs of the examples, by their twins, with default plans"
+    )
+    parser.add_argument(
+        "--rig",
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="this rig file's own, every procedure that it can run",
     )
     parser.add_argument("--report", action="store_true")
     asked = parser.parse_args()
@@ -62,14 +70,23 @@ def run_missing(asked: argparse.Namespace) -> None:
     waiting = []
     with pool(asked.jobs) as (workers, _):
         for seed in seeds:
-            for rig in FOREIGN if asked.foreign else RIGS:
-                found = foreign_cases(rig, asked.only) if asked.foreign else cases_of(rig, asked.only)
+            for rig, found in chosen(asked):
                 cases = [c for c in found if seed - asked.first < limit_of(c, asked)]
                 left = [c for c in cases if (rig, c.name, seed) not in known]
                 if left:
                     waiting.append(workers.submit(run_rig, rig, seed, left, asked.file))
         for job in as_completed(waiting):
             job.result()
+
+
+def chosen(asked: argparse.Namespace) -> Iterator[tuple[str, Iterator[Case]]]:
+    """Each rig that was asked for, with its cases."""
+    if asked.rig:
+        yield from ((rig, able_cases(rig, asked.only)) for rig in asked.rig)
+    elif asked.foreign:
+        yield from ((rig, foreign_cases(rig, asked.only)) for rig in FOREIGN)
+    else:
+        yield from ((rig, cases_of(rig, asked.only)) for rig in RIGS)
 
 
 def limit_of(case: Case, asked: argparse.Namespace) -> int:
