@@ -43,14 +43,12 @@ def shares(rig: RigFile, axis: str) -> dict[str, float]:
     names = [machine.position(a) for a in machine.along(axis)]
     if len(names) == 1:
         return {names[0]: 1.0}
-    l_is, l_os = _probe_arms(rig)
-    own = {names[0]: l_os / (l_is + l_os), names[1]: l_is / (l_is + l_os)}
+    own = _by_lever(rig, axis)
     apart = _between(rig)
     if axis != "z" or abs(math.cos(apart)) < SQUARE:
         return own
-    first = [machine.position(a) for a in machine.along("y")]
     lean, aside = math.cos(apart), abs(math.sin(apart))
-    seen = {c: -w * lean / aside for c, w in zip(first, own.values(), strict=True)}
+    seen = {c: -w * lean / aside for c, w in _by_lever(rig, "y").items()}
     return {c: w / aside for c, w in own.items()} | seen
 
 
@@ -68,14 +66,24 @@ def _between(rig: RigFile) -> float:
     return directions[machine.along("z")[0]] - directions[machine.along("y")[0]]
 
 
-def _probe_arms(rig: RigFile) -> tuple[float, float]:
-    """Of the near and the far probes from the centre of mass, m: as the controller knows them, or by the rig file."""
+def _by_lever(rig: RigFile, axis: str) -> dict[str, float]:
+    """What the two probes that look along y, or along z, have in the position at the centre of mass."""
+    near, far = (conventions(rig).position(a) for a in conventions(rig).along(axis))
+    l_is, l_os = _probe_arms(rig, axis)
+    return {near: l_os / (l_is + l_os), far: l_is / (l_is + l_os)}
+
+
+def _probe_arms(rig: RigFile, axis: str) -> tuple[float, float]:
+    """Of the near and the far probes along y or z from the centre of mass, m: as the controller knows them, or by the rig
+    file, where the two probes of a plane may stand at two places."""
     known = rig.capabilities.model
     if {"l_is", "l_os"} <= known.keys():
         return rig.parameters[known["l_is"]].default, rig.parameters[known["l_os"]].default
     machine, places = conventions(rig), Places(rig)
     by_channel = {probe.channel: name for name, probe in rig.probes.items()}
-    near, far = (places.distance(CENTRE, f"probes/{by_channel[machine.position(a)]}").value for a in machine.along("y"))
+    near, far = (
+        places.distance(CENTRE, f"probes/{by_channel[machine.position(a)]}").value for a in machine.along(axis)
+    )
     return -near, far
 
 
