@@ -95,6 +95,7 @@ class Machine:
             then.
         motions: what it truly does under a plan.
         unknown: keys of `[simulation]` that it never asks for; of a machine that tells them.
+        impossible: by name and value, what is found and expected of a number of its own that it cannot have; else None.
         tick_s, period_s: of its controller, and from sample to sample of its telemetry.
         states: its controller's states in the place of `sim_backend.controller.states.States`, of plant, machine, the
             controller's own parameters, the owner and a planted fault's time.
@@ -126,6 +127,7 @@ class Machine:
     controls: frozenset[str] = frozenset()
     motions: Motions = NONE
     unknown: Callable[[RigFile], Iterable[Problem]] = lambda _: ()
+    impossible: Callable[[str, float], tuple[str, str] | None] = lambda name, value: None
     levitates: bool = True
     states: Callable[..., Any] | None = None
     tick_s: float = TICK_S

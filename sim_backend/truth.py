@@ -6,16 +6,22 @@ The bench never sees any of it; tests and campaigns read `truth.json`.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping
+import math
+from collections.abc import Iterator, Mapping
 
-from bench.errors import ConfigError
+from bench.errors import ConfigError, Problem
 from bench.rigfile import RigFile
 from bench.rigfile.aliases import by_names
+from bench.rigfile.check_machine import POSITIVE
+from bench.rigfile.toleranced import Toleranced
 from sim_backend.controller.controls import in_force
 from sim_backend.draws import draw_one
-from sim_backend.machine import Truth
+from sim_backend.machine import Machine, Truth
 from sim_backend.machines.table import machine_of
 from sim_backend.unspoken import unspoken
+
+BODIES = frozenset(("kg", "kg m^2", "N m^2/A^2", "H", "Ohm", "Hz"))
+"""Units of what a machine has more of than none, where its rig file says so."""
 
 
 def draw(
@@ -32,7 +38,7 @@ def draw(
     `visit` is the same machine on another day, another `stretch` a run on it that was stopped and goes on.
 
     Raises:
-        ConfigError: an override names nothing, or no machine can be made of the rig file.
+        ConfigError: an override names nothing, or is what no machine has; no machine can be made of the rig file.
     """
     machine = machine_of(rig)
     if lacking := tuple(unspoken(rig, machine)):
@@ -56,6 +62,8 @@ def draw(
                 f"--truth {name}: no such value; {'did you mean' if close else 'expected one of'} {', '.join(close or known)}"
             )
         table[name] = float(value)
+    if wrong := tuple(_impossible(rig, machine, wanted | targets, tolerances)):
+        raise ConfigError(f"no machine of rig {rig.name} can be so:", wrong)
     if fixed := {k: float(v) for k, v in wanted.items() if k in rig.simulation and k not in tolerances}:
         # nothing draws these: the machine takes them from its rig file, by which its other numbers were drawn
         machine = machine_of(rig.model_copy(update={"simulation": {**rig.simulation, **fixed}}))
@@ -64,6 +72,24 @@ def draw(
     plant = machine.params(values, defects)
     quantities = machine.quantities(plant, used)
     return Truth(seed, values, defects, plant, quantities, machine, visit, stretch, frozenset(wanted))
+
+
+def _impossible(
+    rig: RigFile, machine: Machine, wanted: Mapping[str, float], tolerances: Mapping[str, Toleranced]
+) -> Iterator[Problem]:
+    """Values that are told and that nothing can have. What `[simulation]` would refuse is refused here too, in its words."""
+    for name, value in wanted.items():
+        t = tolerances.get(name)
+        if not math.isfinite(value):
+            yield Problem("--truth", name, f"{value:g}", "a finite number")
+        elif (
+            t is not None
+            and t.value > 0 >= value
+            and (t.unit in BODIES or name.startswith("geometry.") or name.rpartition(".")[2] in POSITIVE)
+        ):
+            yield Problem("--truth", name, f"{value:g} {t.unit}", "a positive number")
+        elif told := machine.impossible(name, value):
+            yield Problem("--truth", name, *told)
 
 
 def nominal(rig: RigFile) -> Mapping[str, float]:

@@ -10,6 +10,7 @@ from bench.errors import Problem
 from bench.rigfile import RigFile
 from sim_backend.controller.controls import OWN
 from sim_backend.machines.twin.layout import layout_of
+from sim_backend.machines.twin.possible import impossible, without
 from sim_backend.machines.twin.rules import BY_AXIS, BY_JOURNAL, BY_PLANE, ONCE, drawn, short
 
 TABLES = frozenset(("readings", "faults"))
@@ -23,10 +24,12 @@ OF_ALL = frozenset((
 
 
 def unknown(rig: RigFile) -> Iterator[Problem]:
-    """Keys that a twin never asks for, and parts that it has not, each with the nearest that there is."""
+    """Values that cannot be; keys that a twin never asks for, parts that it has not, each with the nearest that there is."""
+    values = tuple(impossible(rig))
+    yield from values
     parts, once = _parts(rig), OF_ALL | ONCE.keys() | OWN.keys()
     joined = {f"{key}_{part}" for key, names in parts.items() for part in names}
-    known = {*once, *parts, *joined, *TABLES, *drawn(rig)}
+    known = {*once, *parts, *joined, *TABLES, *drawn(without(rig, values))}
     for key, said in rig.simulation.items():
         if key not in known:
             yield _problem(rig, key, "a key that the twin has no use for", known)

@@ -22,6 +22,7 @@ from sim_backend.machines.twin.nominal import nominal_of
 from sim_backend.machines.twin.operator import Fitter
 from sim_backend.machines.twin.params import TwinParams, params
 from sim_backend.machines.twin.plant import TwinPlant
+from sim_backend.machines.twin.possible import cannot_be
 from sim_backend.machines.twin.quantities import quantities
 from sim_backend.machines.twin.rules import drawn
 from sim_backend.machines.twin.told import told_of
@@ -55,7 +56,7 @@ def twin(rig: RigFile) -> Machine:
         places=partial(places, rig), spoil=spoil, supply_V=nominal.set("supply_V", 48.0), windings=windings_of(rig),
         copper_W=copper_W,
         operator=operator, traced=partial(traced, rig), daily=DAILY, columns=columns, motions=MOTIONS,
-        unknown=unknown,
+        unknown=unknown, impossible=cannot_be,
     )  # fmt: skip
 
 
