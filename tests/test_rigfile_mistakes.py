@@ -115,8 +115,9 @@ def test_a_signal_that_is_two_channels_is_named_with_both(tmp_path: Path) -> Non
 
 def test_an_overfilled_bus_is_refused_with_its_load(tmp_path: Path) -> None:
     slow = changed(
-        TOML, ("bitrate = 1_000_000", "bitrate = 125_000"), ("data_bitrate = 5_000_000", "data_bitrate = 1e6")
-    )
+        TOML, ("slcan:socket://127.0.0.1:28501", "can:socketcan:can0"), ("bitrate = 1_000_000", "bitrate = 125_000"),
+        ("data_bitrate = 5_000_000", "data_bitrate = 1e6"),
+    )  # fmt: skip
     found = problems(tmp_path, slow)
     # 34 bits at 125 kbit/s and 680 at 1 Mbit/s: 272 us + 680 us = 952 us a ms
     assert list(found) == ["links.controller"]
@@ -139,7 +140,7 @@ def test_several_mistakes_of_all_kinds_are_listed_at_once(tmp_path: Path) -> Non
     found = problems(tmp_path, toml, dbc)
     assert set(found) == {
         "uut.colour", "masses.M3.source", "geometry.hook_to_outboard.unit", "geometry.clearance.value", "masses.M4.value",
-        "parameters.bias_i.default", "links.controller", "channels.pos_xi.signal",
+        "parameters.bias_i.default", "links.controller", "links.controller.bitrate", "channels.pos_xi.signal",
     }  # fmt: skip
 
 

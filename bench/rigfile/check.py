@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import difflib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from bench import units
 from bench.errors import ConfigError, Problem
@@ -21,11 +21,12 @@ from bench.rigfile.check_numbers import MACHINE
 from bench.rigfile.check_numbers import problems_of as problems_of_numbers
 from bench.rigfile.check_states import problems_of as problems_of_states
 from bench.rigfile.messages import MessageMap
-from bench.rigfile.model import RigFile
+from bench.rigfile.model import LinkSpec, RigFile
 from bench.rigfile.possible import impossible
 from bench.rigfile.rest import follows, rest_of
 from bench.rigfile.text import RigText, read_rig
 from bench.units import Unit
+from bench.wire import slcan
 
 
 def check_rig(rig: str) -> tuple[tuple[Problem, ...], BusLoad | None]:
@@ -131,6 +132,22 @@ def _links(rig: RigFile) -> Iterator[Problem]:
         stated = link.bitrate is not None or "bitrate" in {**url.query, **link.options}
         if url.scheme in ("slcan", "can") and not stated:
             yield Problem(rig.path, f"{key}.bitrate", "nothing", "the bit rate of the CAN bus, bit/s")
+        if url.scheme == "slcan":
+            yield from _rates(rig, key, {**url.query, **link.options}, link)
+
+
+def _rates(rig: RigFile, key: str, options: Mapping[str, object], link: LinkSpec) -> Iterator[Problem]:
+    """Of SLCAN, which has a letter and a digit for some rates alone: an adapter would be asked for another one at the start."""
+    fd = str(options.get("fd", True)).lower() not in ("false", "0")
+    for name, codes in (("bitrate", slcan.BITRATES), ("data_bitrate", slcan.DATA_BITRATES if fd else {})):
+        rate = getattr(link, name) or options.get(name)
+        if rate is None or not codes:
+            continue
+        if str(rate).removesuffix(".0") not in {str(code) for code in codes}:
+            expected = (
+                f"a rate that SLCAN has: {', '.join(str(code) for code in codes)}; or another kind of adapter, can:..."
+            )
+            yield Problem(rig.path, f"{key}.{name}", f"{rate:.0f}" if isinstance(rate, float) else str(rate), expected)
 
 
 def _units(rig: RigFile) -> Iterator[Problem]:
