@@ -7,11 +7,14 @@ from fnmatch import fnmatch
 from pathlib import Path
 
 import pytest
-from twin_rigs import HUNG, ROOT, STAND, TOP, number, plant_of, rig
+from twin_rigs import HUNG, ROOT, STAND, TOP, column, levitated, number, plant_of, rig
 
-from bench.rigfile import load_rig
+from bench.rigfile import RigFile, load_rig
+from sim_backend.core import DriveLaw
+from sim_backend.machines.table import machine_of
 from sim_backend.machines.twin.operator import Fitter
 from sim_backend.truth import draw
+from sim_backend.unspoken import unspoken
 
 EXAMPLES = ("plain-stand/stand.toml", "vertical-spindle/spindle.toml")
 # Of who works on it, of the air, of the drive and of the controller's messages; and lengths that a rule of another number asks
@@ -70,3 +73,25 @@ def test_seats_and_weights_that_are_told_are_not_drawn_anew() -> None:
     Fitter(spindle, plant, t).request("attach lower 1e-3 0")
     radius = t.values["balancing.lower.radius"]
     assert math.hypot(plant._s.weight_c[0], plant._s.weight_s[0]) == pytest.approx(1.1e-3 * radius)
+
+
+def without_mark() -> RigFile:
+    """A rig on registers' drive whose file has a channel for the speed and nothing of the mark that gives it."""
+    path = Path(ROOT) / "tests/strangers/lento.toml"
+    inside, kept = "", []
+    for line in path.read_text(encoding="utf-8").split("\n"):
+        inside = line if line.startswith("[") else inside
+        if inside != "[mark]" and not line.startswith(("turns = {", "edge = {")):
+            kept.append(line.replace("rpm = {", "speed = {"))
+    return RigFile.parse("\n".join(kept), path.with_suffix(".dbc").read_text(encoding="utf-8"), "lento.toml")
+
+
+def test_a_speed_is_told_without_a_mark() -> None:
+    r = without_mark()
+    assert r.mark is None
+    assert [*unspoken(r, machine_of(r))] == []
+    plant = levitated(draw(r, 1), 0.1)
+    plant.drive(DriveLaw(5.0, 100.0, 1e6), 100.0)
+    rows = plant.run(round(3.0 / plant.tick_s))
+    assert column(plant, rows, "speed")[-1] == pytest.approx(100.0, rel=0.01)
+    assert plant.speed == pytest.approx(100.0, rel=0.01)  # by which the controller lands it

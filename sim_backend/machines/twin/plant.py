@@ -94,8 +94,8 @@ class TwinPlant(TurningPlant):
 
     @property
     def speed(self) -> float:
-        """Speed in rad/s as the pulses tell it; 0 without a mark."""
-        return float(self._s.tacho.speed) if self.params.names.marked else 0.0
+        """Speed in rad/s as the pulses tell it; 0 where nothing turns the shaft."""
+        return float(self._s.tacho.speed) if self.params.names.timed else 0.0
 
     @property
     def pulse_age_s(self) -> float | None:

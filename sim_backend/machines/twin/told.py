@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from bench.rigfile import RigFile
+from bench.rigfile.turned import turned
 from sim_backend.machines.twin.layout import Numbers, layout_of
 
 POSITION, PLUS, MINUS, VOLTS_PLUS, VOLTS_MINUS, PEAK = 0, 16, 32, 48, 64, 80
@@ -19,7 +20,7 @@ Column = tuple[str, int]
 @dataclass(frozen=True)
 class Told:
     """Names of axes and bearings in the core's order; columns of a telemetry period's rows and of a tick's readings, each
-    with its place in the core; `clear` says whether the rig has a mark."""
+    with its place in the core; `marked` says whether the rig has a mark, `timed` whether its controller knows the speed."""
 
     axes: tuple[str, ...]
     bearings: tuple[str, ...]
@@ -27,6 +28,7 @@ class Told:
     rows: tuple[Column, ...]
     ticks: tuple[Column, ...]
     marked: bool
+    timed: bool
     radial_columns: int
 
 
@@ -41,7 +43,7 @@ def told_of(rig: RigFile, defects: Numbers) -> Told:
     return Told(
         axes=tuple(a.name for a in layout.axes), bearings=tuple(rig.bearings),
         of_bearing=tuple(a.bearing for a in layout.axes), rows=tuple(rows), ticks=captured,
-        marked=rig.mark is not None, radial_columns=len(layout.looking),
+        marked=rig.mark is not None, timed=turned(rig), radial_columns=len(layout.looking),
     )  # fmt: skip
 
 
@@ -71,6 +73,9 @@ def _peaks(rig: RigFile) -> Iterator[Column]:
 
 
 def _mark(rig: RigFile) -> Iterator[Column]:
+    """What the mark tells; the speed by itself too, of a rig whose file says nothing of the mark that gives it."""
+    if turned(rig) and (rig.mark is None or not rig.mark.speed):
+        yield "speed", SPEED
     if rig.mark is None:
         return
     for name, place in OF_MARK:
