@@ -17,6 +17,10 @@ SAME_PLACE_RAD = math.radians(0.1)
 
 def of_plan(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work, before anything starts."""
+    if wrong := tuple(planes.of_plan(rig, plan.planes)):
+        yield from wrong
+        return
+    rig = planes.chosen(rig, plan.planes)
     yield from fitting.of_speeds(rig, plan.speeds_rad_s)
     yield from fitting.of_slow_roll(rig, plan.slow_rad_s, plan.slow_s, plan.speeds_rad_s)
     yield from fitting.of_bearings(rig, plan.slow_rad_s, len(plan.speeds_rad_s))

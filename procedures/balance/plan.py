@@ -22,6 +22,7 @@ class Plan(BenchPlan):
     dwell_s: float = Field(2.0, ge=0.5)
     capture_s: float = Field(0.4, ge=0.05)
     repeat: bool = True  # the lowest speed again at the end of each run
+    planes: tuple[str, ...] = ()  # two of the rig's, which take the weights; none: both, where it has two
     trial_kg: tuple[float, float] = (1e-4, 1e-4)  # inboard, outboard
     trial_angle_rad: tuple[float, float] = (0.0, 0.0)  # on the planes' scales
     leave: bool = False  # trial weights stay on; else each is taken off after its run

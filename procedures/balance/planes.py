@@ -64,17 +64,41 @@ Planes = tuple[Plane, Plane]
 
 
 def missing(rig: RigFile) -> Iterator[str]:
-    """What a balancing needs of the planes and the rig file does not say, a line each."""
-    if len(rig.balancing) != 2:
+    """What a balancing needs of the planes and the rig file does not say, a line each. Of more than two a plan names two."""
+    if len(rig.balancing) < 2:
         found = ", ".join(rig.balancing) or "none"
         yield f"balancing: found {found}; this procedure takes two planes"
         return
+    yield from _of_two(rig) if len(rig.balancing) == 2 else ()
+    yield from _more_probes(rig)
+
+
+def chosen(rig: RigFile, names: Sequence[str]) -> RigFile:
+    """The rig with the two planes that a plan names, or as it is where it names none: what another plane has on it acts like
+    an unbalance in these two."""
+    if not names or {*names} == rig.balancing.keys():
+        return rig
+    return rig.model_copy(update={"balancing": {n: p for n, p in rig.balancing.items() if n in names}})
+
+
+def of_plan(rig: RigFile, names: Sequence[str]) -> Iterator[str]:
+    """What is wrong with the planes that a plan names, or with its naming none."""
+    known = ", ".join(rig.balancing)
+    if not names and len(rig.balancing) > 2:
+        ends = ", ".join(f'"{part.partition("/")[2]}"' for part in facts.unbalance_planes(rig))
+        yield f"planes: found none; expected the two of {known} in which weights are fixed, such as planes = [{ends}]"
+    elif names and (len({*names}) != 2 or len(names) != 2 or not {*names} <= rig.balancing.keys()):
+        yield f"planes: found {', '.join(names)}; expected two of {known}"
+    elif names:
+        yield from _of_two(chosen(rig, names))
+
+
+def _of_two(rig: RigFile) -> Iterator[str]:
     for name, plane in rig.balancing.items():
         for key in ("weight_mass", "weight_angle"):
             if getattr(plane, key) is None:
                 yield f"balancing.{name}.{key}: found none; expected what is not known of a weight that is fixed there"
     yield from _one_sided(rig)
-    yield from _more_probes(rig)
 
 
 def _more_probes(rig: RigFile) -> Iterator[str]:
@@ -105,7 +129,7 @@ def planes_of(rig: RigFile) -> Planes:
     Raises:
         Lacking: it has not two, or they are not told.
     """
-    if lines := tuple(missing(rig)):
+    if lines := (*missing(rig), *of_plan(rig, ())):
         raise Lacking(*lines)
     near, far = (part.partition("/")[2] for part in facts.unbalance_planes(rig))
     lengths = facts.collect_lengths(rig)

@@ -22,7 +22,7 @@ from procedures.amb_rotor.laws import of_laws
 from procedures.balance import decision, sequence
 from procedures.balance.fitting import of_plan
 from procedures.balance.plan import Plan
-from procedures.balance.planes import names_of
+from procedures.balance.planes import chosen, names_of
 from procedures.balance.requires import requires
 from procedures.balance.steps import BASE, known_by, read_runs
 from procedures.shared import assumptions, first_look
@@ -110,7 +110,8 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     first_look.gate(recording, findings, wiring.before_orbits(recording))
     findings.gate([*wiring.before_orbits(recording), *dwell_checks.before(recording), *checks.refusals(recording)],
                   ("no-dwells", "sensor-polarity", "lift-lost", "stuck-channel"))  # fmt: skip
-    plan, rig = recording.plan, recording.rig
+    plan = recording.plan
+    rig = chosen(recording.rig, plan.planes)
     recorded = read_runs(recording, plan.speeds_rad_s)
     # every run is in all results
     findings.add(dwell_checks.of_signals(recorded.dwells, plan.max_lost, plan.max_speed_error, doubts=lambda _: ()))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from bench.errors import AnalysisError
 from bench.procedure.rig import Rig
@@ -15,7 +15,7 @@ from procedures.amb_rotor import lift
 from procedures.amb_rotor.conventions import conventions
 from procedures.balance import decision
 from procedures.balance.plan import Plan
-from procedures.balance.planes import names_of
+from procedures.balance.planes import chosen, names_of
 from procedures.balance.steps import (
     BASE,
     DECISION,
@@ -66,6 +66,7 @@ class Work:
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Look, lift and nudge; slow roll and base run; a run with a trial weight in each plane; corrections, each verified."""
+    rig = replace(rig, file=chosen(rig.file, plan.planes))
     work = Work(rig, plan, record)
     if not lift.lift_and_nudge(rig, record):
         return

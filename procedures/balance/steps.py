@@ -21,7 +21,7 @@ from bench.rigfile.roles import answered, resolved
 from bench.samples import TICKS
 from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.machine import AmbRotor
-from procedures.balance.planes import names_of
+from procedures.balance.planes import chosen, names_of
 from procedures.shared.sampled import of_telemetry
 from procedures.synchronous import mark
 from procedures.synchronous.bearings import Known
@@ -173,7 +173,7 @@ def read_runs(recording: Recording[Any], speeds: Sequence[float]) -> Recorded:
     dwells = read_dwells(recording)
     slow = next((read_dwell(d) for d in dwells if d.kind == SLOW), None)
     turning = [d for d in dwells if d.kind != SLOW]
-    sides = names_of(recording.rig)
+    sides = names_of(chosen(recording.rig, recording.plan.planes))
     mounted: list[tuple[int, Weight | int]] = []
     fixed: list[tuple[Weight, str]] = []
     for step in recording.all_steps():

@@ -105,12 +105,13 @@ def unbalance(done: Simulated) -> Found:
 
 
 def balance(done: Simulated) -> Found:
-    from procedures.balance.planes import names_of
+    from procedures.balance.planes import chosen, names_of
 
     of = done.drawn.machine.motions.left
     if of is None:
         return
-    names = names_of(done.recording.rig)
+    plan: Any = done.recording.plan
+    names = names_of(chosen(done.recording.rig, plan.planes))
     own = of(done.recording.rig, done.drawn, done.recording.events("operator"), names)
     for name, values in (("unbalance", own[0]), ("residual", own[-1])):
         for side, value in zip(names, values, strict=True):
