@@ -12,7 +12,7 @@ from bench.rigfile import RigFile
 from bench.units import RPM
 from procedures.run_up.plan import Passing
 from procedures.run_up.steps import LEAST_TURNS
-from procedures.shared.limits import landing_speed
+from procedures.shared.limits import above_landing, landing_speed
 from procedures.synchronous import fitting
 
 RATES = (1.0, 250.0)  # rad/s^2
@@ -29,8 +29,8 @@ def of_plan(rig: RigFile, plan: Passing) -> Iterable[str]:
     if plan.top_rad_s > most:
         yield f"top_rad_s: found {plan.top_rad_s * RPM:.0f} r/min; the envelope allows {most * RPM:.0f} r/min"
     if not 2 * landing < plan.bottom_rad_s < 0.5 * plan.top_rad_s:
-        yield (f"bottom_rad_s: found {plan.bottom_rad_s * RPM:.0f} r/min; expected above {2 * landing * RPM:.0f} r/min, twice "
-               f"the landing speed, and below half of {plan.top_rad_s * RPM:.0f} r/min")  # fmt: skip
+        yield (f"bottom_rad_s: found {plan.bottom_rad_s * RPM:.0f} r/min; expected above "
+               f"{above_landing(landing)}, and below half of {plan.top_rad_s * RPM:.0f} r/min")  # fmt: skip
     low, high = 1.05 * plan.bottom_rad_s, 0.98 * plan.top_rad_s
     if not all(low <= s <= high for s in plan.speeds_rad_s):
         yield f"speeds_rad_s: expected {low * RPM:.0f} to {high * RPM:.0f} r/min: the shaft must come through them"

@@ -15,7 +15,7 @@ from procedures.sensitivity import sines
 from procedures.sensitivity.injection import Comb, find_refusals, in_whole_samples
 from procedures.sensitivity.plan import Plan
 from procedures.sensitivity.steps import REFINED, captured_channels
-from procedures.shared.limits import landing_speed
+from procedures.shared.limits import above_landing, landing_speed
 from procedures.shared.rates import of_rate
 
 WIDER = "If the controller can do it, widen that parameter's range in the rig file"
@@ -119,7 +119,10 @@ def _speeds(rig: RigFile, plan: Plan) -> Iterator[str]:
     )
     if max(plan.speeds_rad_s) > highest:
         yield f"speeds_rad_s: found {max(plan.speeds_rad_s) * RPM:.0f} r/min; the envelope allows {highest * RPM:.0f} r/min"
-    if any(s < 0 or 0 < s < 2 * landing for s in plan.speeds_rad_s) or len({*plan.speeds_rad_s}) < len(
-        plan.speeds_rad_s
-    ):
-        yield f"speeds_rad_s: expected 0 or above {2 * landing * RPM:.0f} r/min, twice the landing speed, and each once"
+    if min(plan.speeds_rad_s) < 0:
+        found = f"found {min(plan.speeds_rad_s) * RPM:.0f} r/min"
+        yield f"speeds_rad_s: {found}; expected speeds in the shaft's own sense, 0 r/min or above"
+    elif slow := [s for s in plan.speeds_rad_s if 0 < s < 2 * landing]:
+        yield f"speeds_rad_s: found {min(slow) * RPM:.0f} r/min; expected 0 or above {above_landing(landing)}"
+    if len({*plan.speeds_rad_s}) < len(plan.speeds_rad_s):
+        yield "speeds_rad_s: expected each once"

@@ -11,7 +11,7 @@ from bench.rigfile.capture import Layout
 from bench.units import RPM
 from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.machine import AmbRotor
-from procedures.shared.limits import landing_speed
+from procedures.shared.limits import above_landing, landing_speed
 from procedures.shared.rates import of_rate, rate_of
 from procedures.synchronous.bearings import has_model
 from procedures.synchronous.dwells import TELLS, can_capture, captured_channels, telemetry_period_s
@@ -28,18 +28,24 @@ def of_speeds(rig: RigFile, speeds: Sequence[float]) -> Iterator[str]:
     most = rig.envelope.max_speed_rad_s
     landing = landing_speed(rig)
     if most <= 2 * landing:
-        yield (f"speeds_rad_s: no speed fits: above {2 * landing * RPM:.0f} r/min, twice the landing speed, and up to "
+        yield (f"speeds_rad_s: no speed fits: above {above_landing(landing)}, and up to "
                f"{most * RPM:.0f} r/min (envelope.max_speed_rad_s). Expected a lower landing speed "
                "(capabilities.landing_speed) or a greater max_speed_rad_s")  # fmt: skip
         return
     if max(speeds) > most:
         yield f"speeds_rad_s: found {max(speeds) * RPM:.0f} r/min; the envelope allows {most * RPM:.0f} r/min"
-    if min(speeds) <= 2 * landing or len(set(speeds)) < len(speeds):
-        yield f"speeds_rad_s: expected each once, and above {2 * landing * RPM:.0f} r/min, twice the landing speed"
+    if min(speeds) < 0:
+        yield f"speeds_rad_s: found {min(speeds) * RPM:.0f} r/min; expected speeds in the shaft's own sense, above 0 r/min"
+    elif min(speeds) <= 2 * landing:
+        yield f"speeds_rad_s: found {min(speeds) * RPM:.0f} r/min; expected above {above_landing(landing)}"
+    if len(set(speeds)) < len(speeds):
+        yield "speeds_rad_s: expected each once"
 
 
 def of_slow_roll(rig: RigFile, rad_s: float, seconds: float, speeds: Sequence[float]) -> Iterator[str]:
     """A slow roll at `rad_s` (0: none) that is none beside the speeds in rad/s, or too short."""
+    if min(speeds) <= 0:  # which `of_speeds` tells
+        return
     machine = conventions(rig)
     most = too_fast(speeds, machine)
     if rad_s and most < SLOWEST:

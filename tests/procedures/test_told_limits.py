@@ -13,10 +13,12 @@ from bench.rigfile import RigFile, load_rig
 from bench.units import RPM
 from procedures.run_up.procedure import late
 from procedures.run_up.procedure import procedure as run_up
+from procedures.sensitivity.procedure import procedure as sensitivity
 from procedures.spindown import coasts
 from procedures.spindown.plan import Plan as Spindown
 from procedures.synchronous import fitting
 
+STRANGERS = Path(__file__).parents[1] / "strangers"
 SPINDLE = Path(__file__).parents[2] / "examples" / "vertical-spindle" / "spindle.toml"
 
 
@@ -59,6 +61,23 @@ def test_a_landing_speed_above_all_that_is_allowed_is_named() -> None:
     assert "capabilities.landing_speed" in told
     assert "envelope.max_speed_rad_s" in told
     assert any("no speed fits" in x for x in run_up.problems(rig, run_up.plan(**rig.plans.get("run-up", {}))))
+
+
+def test_reversed_speeds_are_told_as_such() -> None:
+    """They were "above 0 r/min, twice the landing speed" on a rig that tells no landing speed."""
+    bare, told = load_rig(str(STRANGERS / "lento.toml")), load_rig("amb5dof")
+    assert [*fitting.of_speeds(bare, (-210.0, 405.0))] == [
+        "speeds_rad_s: found -2005 r/min; expected speeds in the shaft's own sense, above 0 r/min"
+    ]
+    assert [*fitting.of_speeds(bare, (0.0, 405.0, 405.0))] == [
+        "speeds_rad_s: found 0 r/min; expected above 0 r/min", "speeds_rad_s: expected each once",
+    ]  # fmt: skip
+    assert [*fitting.of_speeds(told, (1.0, 405.0))] == [
+        "speeds_rad_s: found 10 r/min; expected above 382 r/min, twice the landing speed"
+    ]
+    assert [*fitting.of_slow_roll(bare, 16.0, 10.0, (-210.0, 405.0))] == []
+    reversed_ = [x for x in sensitivity.problems(told, sensitivity.plan(speeds_rad_s=(-210.0,))) if "speeds" in x]
+    assert reversed_ == ["speeds_rad_s: found -2005 r/min; expected speeds in the shaft's own sense, 0 r/min or above"]
 
 
 def test_a_run_down_of_too_few_edges_says_from_which_speed_it_would_have_enough(tmp_path: Path) -> None:
