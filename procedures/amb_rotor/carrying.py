@@ -24,7 +24,9 @@ from procedures.shared.limits import current_limit
 @dataclass(frozen=True)
 class Load:
     """What an axis of a bearing must give to carry the shaft at rest, `needed` N, and what it can, `available` N; None where
-    the rig file does not say. `current` A is that of the one coil, `bias` the parameter that limits it, "" where none does."""
+    the rig file does not say. `current` A is that of the one coil, `bias` the parameter that limits it, "" where none does.
+    `away` m is how far beyond the magnets' middle, from that coil, the probes' zero is told to be; without that it can give
+    `middle` N."""
 
     plane: str
     axis: str
@@ -32,6 +34,8 @@ class Load:
     available: float | None
     current: float
     bias: str
+    away: float = 0.0
+    middle: float = 0.0
 
 
 def mass(rig: RigFile) -> float | None:
@@ -66,9 +70,11 @@ def _load(rig: RigFile, machine: AmbRotor, axis: str, plane: str, needed: float,
     beta, centre = machine.model_beta(axis), machine.model_offset(axis)
     if not beta or axis not in machine.pulls or axis not in machine.gaps or not np.isfinite(machine.clearance):
         return Load(plane, axis, needed, None, current, bias if limited else "")
-    across = machine.gaps[axis] - off - (rig.parameters[centre].default * way if centre else 0.0)
-    force = rig.parameters[beta].default * current**2 / across**2
-    return Load(plane, axis, needed, float(force), current, bias if limited else "")
+    nearer = rig.parameters[centre].default * way if centre else 0.0
+    force, middle = (
+        float(rig.parameters[beta].default * current**2 / (machine.gaps[axis] - off - x) ** 2) for x in (nearer, 0.0)
+    )
+    return Load(plane, axis, needed, force, current, bias if limited else "", -nearer, middle)
 
 
 def told(rig: RigFile) -> str:
@@ -92,10 +98,19 @@ def added(rig: RigFile) -> str:
 
 def _weak(x: Load) -> str:
     no_bias = "the greatest current (capabilities.current_limit, envelope.max_current_A) is too small"
-    way = f"raise {x.bias}" if x.bias else no_bias
+    way = (f"raise {x.bias}" if x.bias else no_bias) + or_a_zero(x.away, x.middle, x.needed)
     twice = f", twice {x.bias}," if x.bias else ""
     return (f"bearing {x.plane} cannot carry: from the ring {x.axis} must give {x.needed:.3g} N and one coil of "
             f"{x.current:.3g} A{twice} gives {x.available:.3g} N there: {way}")  # fmt: skip
+
+
+def or_a_zero(away: float, middle: float, needed: float) -> str:
+    """Where force is not all that explains it, to be added to what is to be done: a probe's zero that is told so far from the
+    coil, `away` m beyond the magnets' middle, that without this it could give the `middle` N that are `needed`."""
+    if middle < needed:
+        return ""
+    told = f", or look at its probe: its zero is told {1e6 * away:.0f} µm beyond the magnets' middle"
+    return f"{told}, without which that coil can {middle:.3g} N, and a zero that is off explains it as well"
 
 
 def _carried(found: Sequence[Load]) -> str:

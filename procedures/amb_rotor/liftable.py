@@ -25,6 +25,7 @@ from bench.rigfile import RigFile
 from bench.rigfile.numbers import Sum, Term
 from bench.rigfile.places import CENTRE, Places
 from bench.rigfile.toleranced import Toleranced
+from procedures.amb_rotor.carrying import or_a_zero
 from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.lying import NOTHING, carried, number, placed
 from procedures.amb_rotor.machine import AmbRotor
@@ -54,14 +55,17 @@ class Magnet:
 @dataclass(frozen=True)
 class Weak:
     """An `axis` of bearing `plane` that cannot carry its share: the force that it must give at least, `needed` N, and what its
-    coil gives at most, `available` N, with `current` A; by the numbers as they are stated, `stated` (both, N). `bias` is the
-    parameter that limits the current, "" where none does."""
+    coil gives at most, `available` N, with `current` A; by the numbers as they are stated, `stated` (both, N). `away` is how
+    far from that coil the probes' zero is told to lie beyond the magnets' middle, m, and `middle` what the coil gives at most
+    there, N. `bias` is the parameter that limits the current, "" where none does."""
 
     plane: str
     axis: str
     needed: float
     available: float
     stated: tuple[float, float]
+    away: float
+    middle: float
     current: float
     bias: str
 
@@ -74,7 +78,7 @@ class Weak:
         return (
             f"bearing {self.plane} cannot carry the shaft: {self.axis} must give {needed:.3g} N, and where its probes read "
             f"zero its coil of {self.current:.3g} A{by} gives {available:.3g} N; with every tolerance in its favour it must "
-            f"give {self.needed:.3g} N and can {self.available:.3g} N: {way}"
+            f"give {self.needed:.3g} N and can {self.available:.3g} N: {way}{or_a_zero(self.away, self.middle, self.needed)}"
         )
 
 
@@ -101,7 +105,7 @@ def weak(
         found = _of_axis(machine, k, rig, mass, magnets[axis], current)
         if found is not None:
             plane = next(name for name, pair in machine.planes.items() if k in pair)
-            out.append(Weak(plane, axis, *found, current, bias))
+            out.append(Weak(plane, axis, *found, current=current, bias=bias))
     return out
 
 
@@ -146,9 +150,9 @@ def _magnets(machine: AmbRotor, values: Mapping[str, float], calibrations: Itera
 
 def _of_axis(
     machine: AmbRotor, k: int, rig: RigFile, mass: Toleranced, magnet: Magnet, current: float
-) -> tuple[float, float, tuple[float, float]] | None:
-    """Force needed and available in the kindest corner, and both as stated; None where that corner can carry, or where there
-    is nothing to be carried."""
+) -> tuple[float, float, tuple[float, float], float, float] | None:
+    """Force needed and available in the kindest corner, and both as stated; how far beyond the middle that is, and what is
+    available there. None where that corner can carry, or where there is nothing to be carried."""
     s, axis = machine.stations, machine.axes[k]
     gap, weight = s.gaps[axis], (Term("mass", mass), Term("gravity", rig.site.gravity))
     sensor = rig.sensors.get(machine.pulls[axis][0])
@@ -171,7 +175,10 @@ def _of_axis(
     best = _kindest(margin, numbers)
     needed, available = forces(best, magnet.most, most, magnet.off)
     needed -= float(_coupled(rig, machine)[k])
-    return (needed, available, as_stated) if available < needed else None
+    if available >= needed:
+        return None
+    away = -magnet.offset * math.copysign(1.0, float(carried(s, 1.0, best)[k]))
+    return needed, available, as_stated, away, forces(best, magnet.most, most, magnet.off + away)[1]
 
 
 def _coupled(rig: RigFile, machine: AmbRotor) -> Array:

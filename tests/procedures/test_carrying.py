@@ -57,3 +57,15 @@ def test_what_the_rig_file_does_not_tell_is_named() -> None:
     told = carrying.told(RigFile.model_validate(none))
     assert "does not tell force constants (capabilities.model, beta_AXIS), so that" in told
     assert "yi must give " in told
+
+
+def test_a_zero_that_is_told_far_from_the_coil_is_named_too() -> None:
+    """From the ring with the zero 150 um beyond the magnets' middle, where without that the coil could lift."""
+    rig = load_rig("amb5dof")
+    bias, offset = conventions(rig).biases["yo"], conventions(rig).model_offset("yo")
+    middle, far = (with_defaults(rig, **{bias: 0.8, offset: d}) for d in (0.0, -1.5e-4))
+    assert "each axis can carry its share" in carrying.told(middle)
+    told = carrying.told(far)
+    assert told.startswith("bearing outboard cannot carry: from the ring yo must give ")
+    assert f"raise {bias}, or look at its probe: its zero is told 150 µm beyond the magnets' middle" in told
+    assert told.endswith("and a zero that is off explains it as well")

@@ -83,6 +83,20 @@ def test_what_is_found_goes_with_bias_mass_gap_place_and_force_constant() -> Non
     assert liftable.weak(rig, (), {"bias": 0.45, "model_offset_yo": -1e-4})[0].axis == "yo"
 
 
+def test_a_zero_that_is_told_far_from_the_coil_is_named_beside_the_bias() -> None:
+    """At the magnets' middle the coil could carry: a probe's zero that is off explains as much as a bias that is too low."""
+    rig = load_rig("amb5dof")
+    told, middle = (liftable.weak(rig, (), {"bias": 0.54, "model_offset_yo": d}) for d in (-1.5e-4, 0.0))
+    assert [x.axis for x in told] == ["yo"]
+    assert middle == []
+    assert told[0].away == pytest.approx(1.5e-4)
+    assert told[0].available < told[0].needed < told[0].middle
+    assert "raise bias, or look at its probe: its zero is told 150 µm beyond the magnets' middle" in told[0].text
+    assert (
+        "look at its probe" not in of(rig, "yi", bias=0.3).text
+    )  # there the zero is nearer to the coil than the middle
+
+
 def test_a_coupling_may_carry_some_of_it() -> None:
     """1200 N/m that is relaxed up to 50 um off takes 0.063 N; at 12 kN/m it takes ten times as much of each axis' need."""
     rig = load_rig("amb5dof")
