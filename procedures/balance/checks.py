@@ -97,17 +97,20 @@ def _speeds(recorded: Recorded) -> Iterator[Finding]:
             yield Finding("speeds-differ", text, "", Effect.INDETERMINATE)
 
 
+def of_parts(balance: Balanced) -> Iterator[Finding]:
+    """Whether all that was read of the base run says the same unbalance."""
+    base = balance.trials.base
+    if base.name in balance.unbalance:
+        read, speeds = estimates.readings(base) / balance.gain, [r.speed for r in base.reads]
+        yield from apart.parts_apart(balance.solved, read, speeds, balance.unbalance[base.name], balance.planes)
+
+
 def of_result(balance: Balanced, recorded: Recorded, shown: list[Run], plan: Plan, rig: RigFile) -> Iterator[Finding]:
     """Was it reached, did the corrections act as predicted, and the sheet."""
     if balance.solved.condition > WORST_CONDITION:
         text = (f"the condition of the influence coefficients is {balance.solved.condition:.0f}: the probes do not tell the "
                 "planes apart.")  # fmt: skip
         yield Finding("planes-not-told-apart", text, "", Effect.ERROR)
-    base = balance.trials.base
-    if base.name in balance.unbalance:
-        read = estimates.readings(base) / balance.gain
-        speeds = [r.speed for r in base.reads]
-        yield from apart.parts_apart(balance.solved, read, speeds, balance.unbalance[base.name], balance.planes)
     for before, after in pairwise(shown):
         if after.name.startswith("check"):
             yield from predicted(balance, before, after, rig)

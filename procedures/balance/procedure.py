@@ -132,6 +132,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     balance = estimates.solve_runs(recorded.slow, shown, trials, rig, plan, known)
     result = Result(plan, rig, balance, recorded, shown[-1].name, estimates.influences(balance, rig))
     findings.add([bearings.describe(known), *dwelling.uncaptured(rig)])
+    findings.add(checks.of_parts(balance))
     findings.add(checks.of_result(balance, recorded, shown, plan, rig))
     slow = next((d for d in recorded.dwells if d.kind == SLOW), None)
     findings.add(of_balance(listen(recording, slow), recorded, balance, (BASE, result.last), result.influences))
