@@ -12,7 +12,7 @@ from bench.rigfile import RigFile
 from sim_backend.draws import draw_one
 from sim_backend.machines.table import machine_of
 from sim_backend.machines.twin.keys import BY_AXIS, BY_JOURNAL, BY_PLANE, OF_ALL, ONCE, OWN
-from sim_backend.machines.twin.possible import KEYS
+from sim_backend.machines.twin.possible import KEYS, cannot_be
 from sim_backend.truth import draw
 
 STAND = Path(__file__).parents[1] / "examples" / "plain-stand" / "stand.toml"
@@ -114,3 +114,15 @@ def test_no_truth_is_told_that_cannot_be(name: str, value: float, found: str, ex
         draw(rig, 1, {name: value})
     (p,) = caught.value.problems
     assert (p.key, p.found, p.expected) == (name, found, expected)
+
+
+def test_names_that_begin_like_a_key_are_their_own() -> None:
+    """A channel of a bias current, a probe called `mass`: zeros, gains and planted defects have any sign."""
+    assert cannot_be("bias_front.offset", -0.01) is None
+    assert cannot_be("bias.gain", -1.0) is None
+    assert cannot_be("runout_phase_1.x", -3.0) is None
+    assert cannot_be("bias_front", -0.01) == ("-0.01 A", "more than 0 A")
+    rig = RigFile.parse(TEXT, DBC, "stand.toml")
+    signs = {name: -1.0 for name in machine_of(rig).defects if name.startswith("probe_sign.")}
+    assert signs
+    assert draw(rig, 1, signs).defects.items() >= signs.items()

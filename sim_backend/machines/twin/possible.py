@@ -81,13 +81,14 @@ def kind_of(key: str) -> tuple[str, str] | None:
     (`beta_u1`, `beta.u1`) is as the plain one; so is a number of the rig file by its identity (`shaft.mass`)."""
     if key in KEYS:
         return KEYS[key]
-    bases = [base for base in KEYS if key.startswith((f"{base}_", f"{base}."))]
-    if bases:
-        return KEYS[max(bases, key=len)]
     table, dot, _ = key.partition(".")
     if not dot:
-        return None
-    return (MORE if table == "geometry" or key.rpartition(".")[2] in POSITIVE else ANY), ""
+        bases = [base for base in KEYS if key.startswith(f"{base}_")]
+        return KEYS[max(bases, key=len)] if bases else None
+    last = key.rpartition(".")[2]
+    if table in KEYS and last not in ("gain", "offset"):  # which are those of a channel that is called so
+        return KEYS[table]
+    return (MORE if table == "geometry" or last in POSITIVE else ANY), ""
 
 
 def wrong(value: object, may_be: str, unit: str) -> tuple[str, str] | None:
