@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +11,9 @@ import numpy.typing as npt
 from procedures.amb_rotor.machine import AmbRotor
 
 Array = npt.NDArray[np.float64]
+Shaft = Callable[[Array], Array]
+"""What the shaft's motion is in the current, at times of readings (n, ticks): position and rate as the amplifiers answer them,
+the mean of each sample (n, 2); the position as a share of the way that the set point jumps."""
 ONSET, BEFORE_S = 4, 0.03  # periods of the telemetry; s
 COARSE_S, FINE_S = 1e-4, 1e-5  # of the search
 LATE_S = 1.2e-5  # what a square of time leaves of the rotor's answer makes the start late, -20 to 30 us about this mean
@@ -34,15 +37,32 @@ def _answers(later: Array, lag_s: float, window: float, powers: tuple[int, ...])
     return np.column_stack([np.ones(len(since)), answer, *((since**k).mean(axis=1) / window**k for k in powers)])
 
 
+def _held(design: Array, moved: Array) -> Array:
+    """The same (n, 3) of a shaft that moves (n, 2) as it is held: less its position, and with its rate."""
+    rate = moved[:, 1] / (np.abs(moved[:, 1]).max() or 1.0)
+    return np.column_stack([design[:, 0], design[:, 1] - moved[:, 0], rate])
+
+
 def unlike(
-    t: Array, current: Array, began: float, *, tick: float, ticks: int, lag_s: float, window_s: float | None = None
+    t: Array,
+    current: Array,
+    began: float,
+    *,
+    tick: float,
+    ticks: int,
+    lag_s: float,
+    window_s: float | None = None,
+    shaft: Shaft | None = None,
 ) -> float:
     """How unlike an answer is to that of a set point which jumped at `began` as `onset` found it, by the same curve: the rms of
     what it leaves over the window, without the noise of the readings before, over the jump."""
     window = _window(tick, ticks, 0.0) if window_s is None else window_s
-    near = (t > began - BEFORE_S) & (t < began + LATE_S + window)
-    later = t[near, None] - tick * np.arange(1, ticks + 1) - (began + LATE_S + DELAY_TICKS * tick)
-    design = _answers(later, lag_s, window, (2,))
+    late = 0.0 if shaft else LATE_S
+    near = (t > began - BEFORE_S) & (t < began + late + window)
+    reads = t[near, None] - tick * np.arange(1, ticks + 1)
+    later = reads - (began + late + DELAY_TICKS * tick)
+    design = _answers(later, lag_s, window, () if shaft else (2,))
+    design = _held(design, shaft(reads)) if shaft else design
     terms, *_ = np.linalg.lstsq(design, current[near], rcond=None)
     left, after = current[near] - design @ terms, (later > 0).any(axis=1)
     if after.sum() < 2 or (~after).sum() < 2 or terms[1] == 0:
@@ -63,6 +83,7 @@ def onset(
     window_s: float | None = None,
     period_s: float = 0.0,
     answers: int = 1,
+    shaft: Shaft | None = None,
 ) -> tuple[float, float]:
     """When the set point jumped, s on the time of the samples `t` (n,), and the jump of `current` (n,) over its noise.
 
@@ -73,15 +94,21 @@ def onset(
     Where the samples are those of many `answers` laid over each other they tell more: a term c' v' is fitted besides, v' the
     time since, for a rate that a fast loop turns round within the window; and the noise is that of the jump which they make
     together, as if all that is left of one answer were alike.
+
+    Where the motion of the `shaft` is known it stands for itself: i = i_0 + J (u(t) - y(t)) + d y'(t), as a law makes it that
+    goes by the distance from the set point and by the rate.
     """
     window = _window(tick, ticks, period_s) if window_s is None else window_s
     reads = t[:, None] - tick * np.arange(1, ticks + 1)
     near = (t > earliest - BEFORE_S) & (t < latest + window)
     many = answers > 1
+    moved = shaft(reads[near]) if shaft else None
 
     def fitted(t_0: float) -> tuple[float, float, float, float]:
         use = near & (t < t_0 + window)
-        design = _answers(reads[use] - t_0 - DELAY_TICKS * tick, lag_s, window, (1, 2) if many else (2,))
+        powers = () if shaft else (1, 2) if many else (2,)
+        design = _answers(reads[use] - t_0 - DELAY_TICKS * tick, lag_s, window, powers)
+        design = design if moved is None else _held(design, moved[use[near]])
         terms, *_ = np.linalg.lstsq(design, current[use], rcond=None)
         share = math.sqrt(np.linalg.pinv(design.T @ design)[1, 1] * use.sum() / answers) if many else 1.0
         return float(((current[use] - design @ terms) ** 2).mean()), t_0, float(terms[1]), share
@@ -90,4 +117,4 @@ def onset(
     _, found, jump, share = min(fitted(t_0) for t_0 in np.arange(about - COARSE_S, about + COARSE_S, FINE_S))
     rest = t < earliest
     noise = max(float(current[rest].std()) * share, 1e-12)
-    return float(found) - (0.0 if many else LATE_S), abs(jump) / noise if rest.sum() > 5 else 0.0
+    return float(found) - (0.0 if many or shaft else LATE_S), abs(jump) / noise if rest.sum() > 5 else 0.0

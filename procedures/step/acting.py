@@ -12,8 +12,8 @@ import numpy.typing as npt
 from bench.recording import Step
 from bench.rigfile import RigFile
 from procedures.amb_rotor.conventions import conventions
-from procedures.amb_rotor.onset import onset, unlike
-from procedures.step import capturing
+from procedures.amb_rotor.onset import BEFORE_S, ONSET, onset, unlike
+from procedures.step import capturing, following
 
 Array = npt.NDArray[np.float64]
 START_S = 4e-5
@@ -25,6 +25,7 @@ overhung rotor whose light end has turned its bearing's current round after two 
 GONE = 0.25  # of the way: until then the currents push
 ANSWER = 0.25  # of the greatest change of the control current: where it first gets there, the step began
 SURELY_S, PLAIN, FEWEST = 5e-3, 8.0, 25  # before a quarter of the way; standard deviations; samples that tell them
+NEAR_S = BEFORE_S + 0.01  # what of the position is looked at for the start
 WINDOW_S = 1.5e-3  # of single readings, from the start on: the shaft has hardly moved
 
 
@@ -80,9 +81,12 @@ def answer(control: Array, rest: npt.NDArray[np.bool_], until: int) -> tuple[int
     return begin + int(np.argmax(window > max(ANSWER * window.max(), 4 * noise))), True
 
 
-def acted(rig: RigFile, step: Step, t: Array, control: Array, first: int, *, origin_ns: int, turning: bool) -> Acted:
+def acted(
+    rig: RigFile, step: Step, t: Array, control: Array, y: Array, first: int, *, origin_ns: int, turning: bool
+) -> Acted:
     """When the set point changed, s on the time `t` (n,) of samples that counts from `origin_ns`: finer than their period, by
-    the control currents (n,); by their single readings where the step was captured and nothing turns."""
+    the control currents (n,); by their single readings where the step was captured and nothing turns. `y` (n,): the position,
+    as a share of the step."""
     machine, tick = conventions(rig), rig.devices["controller"].tick_s
     period = float(np.median(np.diff(t)))
     earliest, latest = t[first] - 1.8 * period, t[first] - 0.5 * period
@@ -92,9 +96,15 @@ def acted(rig: RigFile, step: Step, t: Array, control: Array, first: int, *, ori
         else capturing.read_control(step, [machine.pair(a) for a in machine.along(str(step.labels["axis"]))])
     )
     ticks, window_s = round(period / tick), None
+    shaft = None
+    if single is None and following.by_distance(machine):
+        near = (t > t[first] - NEAR_S) & (t < t[first] + max(NEAR_S, 2 * ONSET * period))
+        if following.is_told(t[near], y[near], earliest, latest + ONSET * period):
+            shaft = following.motion(t[near], y[near], tick=tick, lag_s=machine.lag_s)
     if single is not None:
         t, control = np.asarray((single[0] - origin_ns) * 1e-9 + tick, np.float64), single[1]
         ticks, window_s = 1, WINDOW_S
-    began, _ = onset(t, control, earliest, latest, tick=tick, ticks=ticks, lag_s=machine.lag_s, window_s=window_s)
-    share = unlike(t, control, began, tick=tick, ticks=ticks, lag_s=machine.lag_s, window_s=window_s)
+    lag_s = machine.lag_s
+    began, _ = onset(t, control, earliest, latest, tick=tick, ticks=ticks, lag_s=lag_s, window_s=window_s, shaft=shaft)
+    share = unlike(t, control, began, tick=tick, ticks=ticks, lag_s=lag_s, window_s=window_s, shaft=shaft)
     return Acted(began, share, (earliest - began, latest - began))

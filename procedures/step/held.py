@@ -8,11 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from bench import units
 from bench.rigfile import RigFile
 from bench.rigfile.check_binding import signal_at
 from bench.rigfile.messages import Signal
 from procedures.amb_rotor.conventions import conventions
+from procedures.amb_rotor.stations import COORDINATES
 from procedures.step.plan import Plan
 
 COARSE = 0.01  # of a step, by which its set points may differ from what was asked for
@@ -35,10 +38,18 @@ def held(rig: RigFile, parameter: str, value: float) -> float:
 
 
 def sent(rig: RigFile, axis: str, value: float) -> float:
-    """Where along an axis the set points for `value` (m) hold the shaft, as they are sent."""
-    each = conventions(rig).point(axis, 1.0)
-    made = sum(share * held(rig, name, share * value) for name, share in each.items())
-    return made / sum(share**2 for share in each.values())
+    """Where along an axis the set points for `value` (m) hold the shaft at its centre of mass, as they are sent. Those of two
+    bearings that are turned against each other, 20 um and 14.142, are rounded by different shares of themselves: the shaft then
+    tilts too, and its centre of mass is off by the lever of each."""
+    machine = conventions(rig)
+    each = machine.point(axis, 1.0)
+    at = {name: held(rig, name, share * value) for name, share in each.items()}
+    ways = [at[name] / share for name, share in each.items()]
+    if max(ways) - min(ways) <= EQUAL * abs(value):
+        return sum(share * at[name] for name, share in each.items()) / sum(share**2 for share in each.values())
+    parameters = machine.can.set_points.axes
+    moved = [at.get(parameters.get(one, ""), 0.0) for one in machine.stations.axes]
+    return float(np.linalg.solve(machine.stations.pulls, moved)[COORDINATES.index(axis)])
 
 
 def asked_over_sent(rig: RigFile, axis: str, begin: float, step: float) -> float:

@@ -194,7 +194,9 @@ def _done(
     first, answered = acting.answer(clean[4:], rest, acting.before_it_moves(clean[0], rest))
     period = float(np.median(np.diff(t)))
     samples = 2 * math.pi / float(np.median(data[SPEED])) / period if turning else AT_REST_S / period
-    acted = acting.acted(rig, step, t, clean[3], first, origin_ns=int(data["t_ns"][0]), turning=turning)
+    acted = acting.acted(
+        rig, step, t, clean[3], clean[0] / case.size, first, origin_ns=int(data["t_ns"][0]), turning=turning
+    )
     since = t - acted.began - EARLY_TICKS * rig.devices["controller"].tick_s
     keep = slice(max(first - 20, 0), None)
     quiet = clean[0][rest]
