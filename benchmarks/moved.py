@@ -112,12 +112,19 @@ def attempt(procedure: str, rig: str, seed: int, truth: Mapping[str, float], fol
     before = {name: switches for name, switches in needed_by(procedure).items() if name in TWINS.get(rig, (name,))}
     for name, switches in {**before, procedure: {}}.items():
         path.unlink(missing_ok=True)
-        done = simulated_run(name, rig, seed, {**QUICK.get(name, {}), **switches}, path, truth, known)
+        done = simulated_run(name, rig, seed, {**_quick(name, rig), **switches}, path, truth, known)
         if name != procedure:
             if serious(done):
                 raise BenchError(f"{name}: {', '.join(serious(done))}")
             known[name] = done.calibration()
     return done
+
+
+def _quick(procedure: str, rig: str) -> dict[str, Any]:
+    """The short plan; a twin has speeds and captures of its own."""
+    return {
+        k: v for k, v in QUICK.get(procedure, {}).items() if rig not in TWINS or k not in ("speeds_rad_s", "capture_s")
+    }
 
 
 def serious(done: Simulated) -> list[str]:
