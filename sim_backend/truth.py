@@ -85,7 +85,11 @@ def _impossible(
         elif (
             t is not None
             and t.value > 0 >= value
-            and (t.unit in BODIES or name.startswith("geometry.") or name.rpartition(".")[2] in POSITIVE)
+            and (
+                t.unit in BODIES
+                or (name.startswith("geometry.") and t.unit == "m")
+                or name.rpartition(".")[2] in POSITIVE
+            )
         ):
             yield Problem("--truth", name, f"{value:g} {t.unit}", "a positive number")
         elif name not in machine.defects and (told := machine.impossible(name, value)):
