@@ -19,7 +19,7 @@ def row(m: Content, definitions: Mapping[str, str], titles: Mapping[str, str]) -
     """The row of one measurement of record.json."""
     name, unit = str(m.get("name", "")), str(m.get("unit") or "")
     expanded, verdict = m.get("expanded_uncertainty"), str(m.get("verdict") or "none")
-    limit = m.get("limit")
+    limit, untold = m.get("limit"), m.get("method") == "monte-carlo" or m.get("value") is None
     return ResultRow(
         symbol=tables.symbol_of(name, titles),
         about=text.prose(tables.called(definitions.get(name, ""), titles, definitions)),
@@ -27,7 +27,7 @@ def row(m: Content, definitions: Mapping[str, str], titles: Mapping[str, str]) -
         result=text.result(m.get("value"), expanded, unit),
         interval=_telling_interval(m, unit),
         k=text.factor(m.get("coverage_factor")),
-        dof=text.DASH if m.get("method") == "monte-carlo" else text.degrees_of_freedom(m.get("dof")),
+        dof=text.DASH if untold else text.degrees_of_freedom(m.get("dof")),
         probability=text.probability(m.get("coverage_probability")),
         limit=_limit(limit, unit, text.shift_of(m.get("value"), expanded)),
         limit_source=text.prose(_limit_source(limit)),
