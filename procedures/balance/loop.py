@@ -17,7 +17,18 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from procedures.synchronous.runout import Stand, Turning, arms, divided, equivalent, impedance, slopes, times, waves
+from procedures.synchronous.runout import (
+    Stand,
+    Turning,
+    arms,
+    divided,
+    equivalent,
+    impedance,
+    runout_forces,
+    slopes,
+    times,
+    waves,
+)
 
 Complex = npt.NDArray[np.complex128]
 PLANES = ([0, 3], [1, 2])  # y and theta, z and psi
@@ -28,8 +39,7 @@ def beside_unbalance(s: Stand, t: Turning, runout: Complex, influence: Complex) 
     """What the probes read (4,) m of a runout (4,) m beside what they read of the unbalance that it is taken for. `influence`
     (4, 2) m/(kg m) from the mark, at the speed of `t`."""
     w = t.speed
-    d = impedance(s, slopes(s, t.means)[2], w, w)
-    forces = times(d, divided(runout, s.probes))
+    d, forces = impedance(s, slopes(s, t.means)[2], w, w), runout_forces(s, t.means, runout, w)
     taken, _ = equivalent(s, forces, w)
     acts = w**2 * arms(s.l_iu, s.l_ou).mT @ waves(s)
     q: Complex = np.asarray(np.linalg.solve(s.probes, influence), np.complex128)

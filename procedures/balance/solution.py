@@ -44,8 +44,8 @@ class Trials:
 class Solved:
     """By speed `influence` (s, 4, 2) m/(kg m), probes over their gain, and `taken` (s, 2) kg m, the unbalance on the scale that
     the runout is taken for, and what the probes read of it `beside` that (s, 4) m; `placed` (2, 2), what the forces say at the
-    highest speed of each trial weight (row) in each
-    plane, over what it should be; `mark` rad, from the scale's zero to the mark; `runout` (4,) m from the mark."""
+    highest speed of each trial weight (row) in each plane, over what it should be; `mark` rad, from the scale's zero to the
+    mark; `runout` (4,) m from the mark."""
 
     influence: Complex
     placed: Complex

@@ -213,8 +213,12 @@ def as_unbalance(s: Stand, means: Array, runout: Complex, w: float) -> Complex:
     A loop of any controller sees nothing but what the probes read. With q = H (F + w^2 B U) of the shaft alone and
     X = A_s q + R the readings of U and R are X = G (U + U_R) with w^2 B U_R = H^-1 A_s^-1 R: the loop is in G alone.
     """
-    _, _, k_x = slopes(s, means)
-    return equivalent(s, times(impedance(s, k_x, w, w), divided(runout, s.probes)), w)[0]
+    return equivalent(s, runout_forces(s, means, runout, w), w)[0]
+
+
+def runout_forces(s: Stand, means: Array, runout: Complex, w: float) -> Complex:
+    """Forces and moments (4,) by which a runout (4,) m acts on a loop at `w` rad/s: H^-1 A_s^-1 R."""
+    return np.asarray(times(impedance(s, slopes(s, means)[2], w, w), divided(runout, s.probes)))
 
 
 def shaft_motion(s: Stand, turning: Turning, order: float, unbalance: Complex, more: Complex | None = None) -> Complex:

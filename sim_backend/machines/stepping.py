@@ -23,10 +23,8 @@ DECIMATED_S, ROWS, ORDER = 4e-4, 60, 12  # of the identification: between sample
 BEGIN_S, LENGTH_S = 6e-4, 0.1  # of the record that it is made of
 SLOW_HZ, FAST_HZ, DAMPED = 15.0, 250.0, 0.95  # of the rigid modes: slower are integrators, faster filters and bending
 OF_ITS_OWN = 0.75  # of the pole that carries most: what lies farther from it is another oscillation
-SWING_S, BAND_S = (
-    0.08,
-    (0.25, 0.5, 1.0),
-)  # of the first swing; of the response that makes the bandwidth: the first that is calm
+SWING_S = 0.08  # of the first swing
+BAND_S = 0.25, 0.5, 1.0  # of the response that makes the bandwidth: the first that is calm
 CALM = 0.01  # of the step, over the last fifth of it
 SCANNED = 40  # the first line of the response that is looked at: 20 Hz, where the procedure begins
 PHASES = 3  # of the revolution, at which steps begin: what goes with one or two a turn has no mean
