@@ -34,7 +34,7 @@ from bench.findings import Effect, Finding
 from bench.procedure import Measured
 from bench.rigfile import RigFile, load_rig
 from bench.rigfile.toleranced import Toleranced
-from bench.uncertainty import interval
+from bench.uncertainty import Estimate, Influence, interval
 from benchmarks.cases import FOREIGN, RIGS, load, needed_by
 from reports.unseen import is_reached
 from sim_backend.machines.table import machine_of
@@ -65,6 +65,8 @@ NAMES = {"hanger": "masses/hanger", "mass_density": "masses/density", "polar_ine
          "ring_inertia": "machine/ring_inertia", "roll": "machine/radial_axes", "beta_4": "machine/torque_ripple",
          **{f"segment_gain_{k}": f"machine/segment_gain/{k + 1}" for k in range(4)}}  # fmt: skip
 
+WEIGHTS = {"weight_mass": "kg", "weight_angle": "angle"}  # how budgets call what a weight has by itself
+
 
 @dataclass(frozen=True)
 class Moved:
@@ -90,6 +92,18 @@ def identity(name: str) -> str:
             return kind.format(name.removeprefix(start))
     table, _, rest = name.partition(".")
     return f"sensors/{table}/{rest}" if rest in ("gain", "offset") else name.replace(".", "/")
+
+
+def shares(name: str, estimate: Estimate) -> list[tuple[Influence, float]]:
+    """The influences of a drawn number on a result, each with its sensitivity: one, but of what every weight of a plane has by
+    itself (`balancing.PLANE.weight_mass`) one for each trial weight in it."""
+    table, _, rest = name.partition(".")
+    plane, _, key = rest.rpartition(".")
+    if table == "balancing" and key in WEIGHTS:
+        ends = f"/{WEIGHTS[key]}"
+        return [(i, c) for i, c in estimate.sensitivities.items()
+                if i.id.startswith("weight/") and i.id.endswith(ends) and i.name.endswith(f", {plane}")]  # fmt: skip
+    return [(i, c) for i, c in estimate.sensitivities.items() if i.id == identity(name)]
 
 
 def numbers(rig: RigFile) -> dict[str, float]:
@@ -181,15 +195,15 @@ class Sound:
         """nothing, budget, listed or FAILS: a result's shift by a number, and its error in its own U."""
         if shift <= MATTERS or own <= ITSELF:
             return "nothing"
-        shares = [(i, c) for i, c in self.base[key][1].estimate.sensitivities.items() if i.id == identity(name)]
-        if shares and not is_reached(identity(name), self.run.procedure.reached):
+        found = shares(name, self.base[key][1].estimate)
+        if found and not any(is_reached(i.id, self.run.procedure.reached) for i, _ in found):
             return "listed"
         drawn = interval(self.base[key][1].estimate, self.run.seed).contributions  # at a kink a derivative is no share
         linear = sum(
             drawn.get(i.id, abs(c) * i.u) * HALF_WIDTHS * (2.0 if i.distribution == "normal" else math.sqrt(3))
-            for i, c in shares
+            for i, c in found
         )
-        return "budget" if shares and shift * self.wide[key] <= LINEAR * linear + self.wide[key] else "FAILS"
+        return "budget" if found and shift * self.wide[key] <= LINEAR * linear + self.wide[key] else "FAILS"
 
 
 def moved(procedure: str, rig: str, seed: int, names: Mapping[str, float], folder: Path) -> Iterator[Moved]:

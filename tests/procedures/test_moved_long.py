@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from bench.rigfile import load_rig
-from benchmarks.moved import identity, moved, numbers
+from bench.uncertainty import Estimate, Influence
+from benchmarks.moved import identity, moved, numbers, shares
 
 SEED = 5
 
@@ -49,3 +50,15 @@ def test_drawn_numbers_are_known_by_their_influences() -> None:
     assert identity("hanger") == "masses/hanger"
     assert numbers(load_rig("tsbs12"))["i_yi_p.gain"] == pytest.approx(1.009)
     assert numbers(load_rig("tsbs12"))["geometry.lever_left"] == pytest.approx(0.2303)
+
+
+def test_a_number_that_each_weight_has_by_itself_is_known_by_all_of_its_plane() -> None:
+    """Else every weight of a plane off by as much would stand in no budget."""
+
+    def weight(number: int, what: str, plane: str) -> Influence:
+        return Influence(f"weight/{number}/{what}", f"mass of the trial weight, {plane}", 1e-6, "kg", "B", "normal")
+
+    one, two, three = weight(1, "kg", "upper"), weight(2, "kg", "lower"), weight(3, "kg", "upper")
+    told = Estimate(1.0, "kg m", {one: 2.0, two: 3.0, three: -1.0, weight(1, "angle", "upper"): 5.0})
+    assert shares("balancing.upper.weight_mass", told) == [(one, 2.0), (three, -1.0)]
+    assert shares("balancing.upper.radius", told) == []
