@@ -23,6 +23,7 @@ from bench.rigfile import RigFile
 from bench.rigfile.capture import Layout
 from bench.rigfile.roles import STATUS
 from procedures.amb_rotor.machine import AmbRotor
+from procedures.step.turning import with_angle
 
 Array = npt.NDArray[np.float64]
 Samples = dict[str, npt.NDArray[Any]]
@@ -67,14 +68,14 @@ def fetch(rig: Rig, number: int) -> None:
 def read(step: Step, names: Sequence[str]) -> Samples:
     """Samples of a step by channel or role, with `t_ns` and `index`: of its telemetry, or, where it was captured, of that. What
     was not captured is as the telemetry has it: the status of the whole step, else interpolated."""
-    told, found = step.read(*names), _captured(step)
+    told, found = with_angle(step.recording.rig, step.read(*names)), _captured(step)
     if found is None:
         return told
     tick_s = step.recording.rig.devices["controller"].tick_s
     fast = averaged(found, [n for n in names if n in found.channels], tick_s)
     t = (fast["t_ns"] - fast["t_ns"][0]) * 1e-9
     slow = (told["t_ns"] - fast["t_ns"][0]) * 1e-9
-    for name in names:
+    for name in told:
         if name == STATUS:
             word = np.bitwise_or.reduce(told[name].astype(np.int64)) if len(slow) else 0
             fast[name] = np.full(len(t), word)

@@ -22,8 +22,8 @@ from bench.recording import Recording, Step
 from bench.rigfile.roles import ANGLE, SPEED
 from procedures.amb_rotor.conventions import conventions
 from procedures.step import capturing
-from procedures.step.requires import marked
-from procedures.step.steps import ORDERS, STEP, TURNING_RAD_S, at_rest_if_untold
+from procedures.step.steps import ORDERS, STEP, TURNING_RAD_S
+from procedures.step.turning import marked
 
 Array = npt.NDArray[np.float64]
 FALSE_ALARM = 1e-4
@@ -51,8 +51,8 @@ def read_rest(step: Step, axis: str) -> Array:
     machine = conventions(step.recording.rig)
     along = machine.along(axis)
     places, pairs = [machine.position(a) for a in along], [machine.pair(a) for a in along]
-    names = (*places, *(name for pair in pairs for name in pair), *marked(machine))
-    data = at_rest_if_untold(capturing.read(step, names))
+    names = (*places, *(name for pair in pairs for name in pair), *marked(step.recording.rig))
+    data = capturing.read(step, names)
     written = [e["t_ns"] for e in step.recording.events("parameter")
                if e["name"] in machine.point(axis, 0.0) and step.start_ns <= e["t_ns"] < step.end_ns]  # fmt: skip
     rest = data["t_ns"] <= (written[0] if written else step.start_ns)

@@ -32,6 +32,7 @@ from procedures.step.position import leans
 from procedures.step.record_length import enough_s, faded_s
 from procedures.step.requires import requires
 from procedures.step.steps import STEP, TURNING_RAD_S, Case, Done, cases, read_steps
+from procedures.step.turning import marked
 
 if TYPE_CHECKING:
     from procedures.step.estimates import Result
@@ -239,8 +240,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     most = rig.envelope.max_speed_rad_s
     if max(plan.speeds_rad_s) > most:
         yield f"speeds_rad_s: found {max(plan.speeds_rad_s) * RPM:.0f} r/min; the envelope allows {most * RPM:.0f} r/min"
-    if max(plan.speeds_rad_s) > 0 and not machine.marked:
-        yield "speeds_rad_s: the rig tells no angle and speed of the shaft; expected 0 alone"
+    if max(plan.speeds_rad_s) > 0 and not marked(rig):
+        yield "speeds_rad_s: the rig tells nothing of how the shaft turns (its mark); expected 0 alone"
     if max(plan.speeds_rad_s) > 0 and not any("drive" in d.roles for d in rig.devices.values()):
         yield "speeds_rad_s: the rig file has no device in the role drive, so that nothing turns the shaft"
 

@@ -4,27 +4,24 @@ from __future__ import annotations
 
 from bench.procedure.requires import Requires
 from bench.rigfile import RigFile
-from bench.rigfile.roles import ANGLE, SPEED, STATUS
+from bench.rigfile.roles import STATUS
 from procedures.amb_rotor.conventions import conventions
-from procedures.amb_rotor.machine import AmbRotor
 from procedures.step import capturing
 from procedures.step.probes import is_plain
+from procedures.step.turning import marked
+from procedures.synchronous import mark
 
 
-def channels(machine: AmbRotor) -> tuple[str, ...]:
+def channels(rig: RigFile) -> tuple[str, ...]:
     """What is read of a step."""
-    return (*capturing.channels(machine), *marked(machine), STATUS)
-
-
-def marked(machine: AmbRotor) -> tuple[str, ...]:
-    """Roles that tell how the shaft turns, where the rig has them."""
-    return (ANGLE, SPEED) if machine.marked else ()
+    return (*capturing.channels(conventions(rig)), *marked(rig), STATUS)
 
 
 def requires(rig: RigFile) -> Requires:
     """By the names that the rig's machine has."""
     machine = conventions(rig)
-    read = channels(machine)
+    by_edges = not mark.by_angle(rig) and bool(marked(rig))
+    read = (*capturing.channels(machine), *(mark.needed(rig) if by_edges else marked(rig)), STATUS)
     return Requires(
         lacks=machine.lacks if is_plain(rig) else (*machine.lacks, *machine.stations.lacks),
         channels=read,

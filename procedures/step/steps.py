@@ -142,7 +142,7 @@ def told(steps: Sequence[Done]) -> list[Done]:
 
 def _read(recording: Recording[Any], step: Step) -> Done:
     machine = conventions(recording.rig)
-    data, labels = _whole(at_rest_if_untold(capturing.read(step, channels(machine)))), step.labels
+    data, labels = _whole(capturing.read(step, channels(recording.rig))), step.labels
     axis, signed = str(labels["axis"]), float(labels["step_m"])
     case = Case(str(labels["setting"]), float(labels["speed_rad_s"]), axis, abs(signed), 1 if signed > 0 else -1)
     written = [e["t_ns"] for e in recording.events("parameter")
@@ -154,12 +154,6 @@ def _read(recording: Recording[Any], step: Step) -> Done:
         raise AnalysisError(f"{case.where}: found {int(rest.sum())} samples before the step and {int((~rest).sum())} after; "
                             "expected at least 50 and 100")  # fmt: skip
     return replace(_done(recording.rig, step, case, data, rest), apart=(written[-1] - written[0]) * 1e-9)
-
-
-def at_rest_if_untold(data: dict[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
-    """With angle and speed of a shaft that rests, where the rig does not tell them."""
-    nothing = np.zeros(len(data["t_ns"]))
-    return {ANGLE: nothing, SPEED: nothing, **data}
 
 
 def _whole(data: dict[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
