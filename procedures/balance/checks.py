@@ -101,8 +101,7 @@ def of_parts(balance: Balanced) -> Iterator[Finding]:
     """Whether all that was read of the base run says the same unbalance."""
     base = balance.trials.base
     if base.name in balance.unbalance:
-        read, speeds = estimates.readings(base) / balance.gain, [r.speed for r in base.reads]
-        yield from apart.parts_apart(balance.solved, read, speeds, balance.unbalance[base.name], balance.planes)
+        yield from apart.parts_apart(balance.apart, balance.unbalance[base.name], balance.planes)
 
 
 def of_result(balance: Balanced, recorded: Recorded, shown: list[Run], plan: Plan, rig: RigFile) -> Iterator[Finding]:

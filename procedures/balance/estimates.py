@@ -18,6 +18,7 @@ from bench.uncertainty.estimate import merged
 from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.lengths import lengths_by_name
 from procedures.balance import scatter as balance_scatter
+from procedures.balance.apart import parts_of, said, share_of
 from procedures.balance.plan import Plan
 from procedures.balance.planes import Planes, all_told, names_of, planes_of
 from procedures.balance.solution import Solved, Trials, runout_as_unbalance, runout_beside, solve
@@ -42,7 +43,8 @@ NONLINEAR = 3.0  # of (X/gap)^2
 @dataclass(frozen=True)
 class Balanced:
     """Nominal solution; of each run the unbalance by plane as `vectors` (2,) kg m on the planes' scales and its `parts` re, im
-    by plane (4,); U_per of each plane, kg m; the `planes`; `gain` (4,) of the probes."""
+    by plane (4,); U_per of each plane, kg m; the `planes`; `gain` (4,) of the probes. By part of the base run how far it moves
+    the unbalance from what all readings say, and its share of it (`apart`)."""
 
     trials: Trials
     solved: Solved
@@ -51,6 +53,7 @@ class Balanced:
     permissible: tuple[Estimate, Estimate]
     planes: Planes
     gain: Array
+    apart: Mapping[str, tuple[Vectors, float]]
 
 
 @dataclass(frozen=True)
@@ -91,6 +94,8 @@ def solve_runs(
 
     speeds = np.array([r.speed for r in trials.base.reads])
     near = (speeds / (2 * math.pi * plan.bending_hz)) ** 2 if plan.bending_hz else 0 * speeds
+    stand, nominal = _solve_with({name: e.value for name, e in inputs.items()}, slow, trials, near)
+    groups = parts_of([r.speed for r in trials.base.reads])
 
     def parted(v: dict[str, Array]) -> dict[str, Array]:
         s, found = _solve_with(v, slow, trials, near)
@@ -98,22 +103,38 @@ def solve_runs(
         out: dict[str, Array] = {}
         for run in runs:
             read = readings(run) / s.gain[:, None]
-            u = found.unbalance(read) + replace(found, taken=0 * found.taken).unbalance(read) * bent
-            u = all_told(planes, u, (v["scale_0"], v["scale_1"]))
-            out |= {f"{run.name}/{k}": x for k, x in enumerate(u.view(np.float64).T)}
+            whole = found.unbalance(read)
+            u = whole + replace(found, taken=0 * found.taken).unbalance(read) * bent
+            of = {run.name: u}
+            if run.name == trials.base.name:
+                of |= {
+                    name: share_of(nominal, part) * (said(found, read, part) - whole) for name, part in groups.items()
+                }
+            for name, x in of.items():
+                told = all_told(planes, x, (v["scale_0"], v["scale_1"]))
+                out |= {f"{name}/{k}": y for k, y in enumerate(told.view(np.float64).T)}
         return out
 
     out = propagate_stacked(parted, inputs)
-    stand, nominal = _solve_with({name: e.value for name, e in inputs.items()}, slow, trials, near)
-    parts = {}
+    parts, apart = {}, {}
     for run in runs:
         scatter = balance_scatter.of_run(stand, nominal, slow, run, trials, plan.refit_u_kg_m)
         parts[run.name] = tuple(
             Estimate(e.value, "kg m", merged(((1.0, e), *more)))
             for e, more in zip((out[f"{run.name}/{k}"] for k in range(4)), scatter, strict=True)
         )
+        if run.name == trials.base.name:
+            noise = covariance([Estimate(0.0, "kg m", merged(more)) for more in scatter])
+            apart = {name: (_moved([out[f"{name}/{k}"] for k in range(4)], noise), share_of(nominal, part))
+                     for name, part in groups.items()}  # fmt: skip
     unbalance = {name: _vectors(p) for name, p in parts.items()}
-    return Balanced(trials, nominal, unbalance, parts, permissible_of_planes(rig, plan), planes, stand.gain)
+    return Balanced(trials, nominal, unbalance, parts, permissible_of_planes(rig, plan), planes, stand.gain, apart)
+
+
+def _moved(parts: Sequence[Estimate], noise: Array) -> Vectors:
+    """How far a part of the readings moves the unbalance; noise is as much as that of all, at most."""
+    values = np.array([complex(parts[k].value, parts[k + 1].value) for k in (0, 2)])
+    return Vectors(values, covariance(parts) + noise)
 
 
 def _solve_with(v: Mapping[str, Any], slow: Read | None, trials: Trials, near: Array) -> tuple[Stand, Solved]:

@@ -60,12 +60,15 @@ class Solved:
         a = self.influence.reshape(-1, 2)
         return float(np.linalg.cond(a / np.linalg.norm(a, axis=0)))
 
+    def clean(self, readings: Complex) -> Complex:
+        """What unbalance makes of readings (s, 4) m over gain."""
+        return np.asarray(readings - self.beside - np.einsum("...spq,...sq->...sp", self.influence, self.taken))
+
     def unbalance(self, readings: Complex) -> Complex:
         """Unbalance (2,) kg m on the scale, from readings (s, 4) m over gain."""
         a = self.influence
-        clean = readings - self.beside - np.einsum("...spq,...sq->...sp", a, self.taken)
         every = (*a.shape[:-3], -1)  # speed and probe
-        return np.asarray(times(np.linalg.pinv(a.reshape(*every, 2)), clean.reshape(every)))
+        return np.asarray(times(np.linalg.pinv(a.reshape(*every, 2)), self.clean(readings).reshape(every)))
 
 
 def solve(s: Stand, slow: Turning | None, trials: Sequence[Trial], base: Sequence[Turning]) -> Solved:

@@ -16,7 +16,7 @@ from procedures.shared import signals
 from procedures.step.estimates import Result
 from procedures.step.plan import Plan
 from procedures.step.steps import STEP, Case, Done
-from procedures.step.untold import OF_CASE, OF_GROUP, OF_SIZES, Why
+from procedures.step.untold import GYROSCOPIC, OBLIQUE, OF_CASE, OF_GROUP, OF_SIZES, Why
 
 FATAL = (
     "current-sign",
@@ -234,17 +234,13 @@ def of_results(
             yield Finding("band-widened", f"five times the noise of the averaged position is {widest:.1%} of the "
                                           f"step; the settling "
                           f"time is that into this band, not into {plan.band:.1%}.", case.where)  # fmt: skip
-    axes = {case.group: case.axis for case in results}
+    shared = {case.group for case, result in results.items() if result.shared}
     for where, estimates in groups.items():
-        if leaning and axes[where] != "x":
-            text = (
-                "the axes of a bearing are not at right angles and each has a control of its own: a step along y or z swings "
-                "along both, with two oscillations that lie far apart. One is what would be fitted: overshoot, settling, "
-                "bandwidth, damping and frequency are not told; rise and error are."
-            )
+        if where in shared:
             coupled = [f"{q}@{c.where}" for c in results if c.group == where for q in (*OF_CASE, "settling_time")]
             coupled += [f"{q}@{where}" for q in (*OF_SIZES, *OF_GROUP)]
-            yield Finding("axes-oblique", text, where, concerns=tuple(coupled))
+            code, text = ("axes-oblique", OBLIQUE) if leaning else ("gyroscopic", GYROSCOPIC)
+            yield Finding(code, text, where, concerns=tuple(coupled))
         elif untold.get(where) is Why.TORN:
             text = (
                 "two oscillations share the response, and one of them is damped so heavily that it hardly swings, as where one "

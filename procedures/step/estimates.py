@@ -19,13 +19,14 @@ from procedures.step import response, settling
 from procedures.step import steps as step_steps
 from procedures.step.acting import START_S
 from procedures.step.coupled import Tilting, hardly_swings
-from procedures.step.fit import swing
+from procedures.step.fit import shape, swing
 from procedures.step.oscillation import One, Swing
 from procedures.step.position import leans, shares, tilting_of
 from procedures.step.rising import rises
 from procedures.step.scatter import jackknifed, left_out, pooled, repeated, weighed
 from procedures.step.settling import Curve, Settling
 from procedures.step.steps import Case, Done
+from procedures.step.whirling import whirls
 
 Array = npt.NDArray[np.float64]
 # Of the bandwidth b: what the sampling rate r folds onto it from r - b. From a tenth of r - b on it falls as the cube of
@@ -43,7 +44,8 @@ TAIL_S = 0.2
 @dataclass(frozen=True)
 class Result:
     """The steps of one case, what was fitted to their mean (None: no oscillation), and each quantity with its influences; no
-    settling time where the position does not settle."""
+    settling time where the position does not settle. `shared`: y and z swing together, and what one oscillation would tell is
+    not told."""
 
     case: Case
     ones: tuple[One, ...]
@@ -51,6 +53,7 @@ class Result:
     settled: Settling
     error: float
     estimates: Mapping[str, Estimate]
+    shared: bool = False
 
 
 def by_case(steps: list[Done], rig: RigFile, band: float) -> dict[Case, Result]:
@@ -61,7 +64,9 @@ def by_case(steps: list[Done], rig: RigFile, band: float) -> dict[Case, Result]:
     """
     done, tilting = step_steps.by_case(steps), tilting_of(rig)
     ones = {case: tuple(_one(d) for d in d_all) for case, d_all in done.items()}
-    fits = {case: [] if leans(rig, case.axis) else _fits(o, tilting) for case, o in ones.items()}
+    together = {g: leans(rig, of[0].case.axis) or whirls(of) for g, of in step_steps.by_group(steps).items()}
+    shared = {case: together[case.group] for case in ones}
+    fits = {case: [] if shared[case] else _fits(o, tilting) for case, o in ones.items()}
     rising, left = rises(ones, {case.group for case, of in done.items() if of[0].late_s})
     seen = {
         "rise_time": rising,
@@ -74,7 +79,7 @@ def by_case(steps: list[Done], rig: RigFile, band: float) -> dict[Case, Result]:
     for case, all_of in done.items():
         settled = settling.settling(curves[case.group], case, all_of, band)
         found = {name: pooled(name, case, s) for name, s in seen.items() if case in s.values}
-        if math.isfinite(settled.time) and not leans(rig, case.axis):
+        if math.isfinite(settled.time) and not shared[case]:
             found["settling_time"] = settling_estimate(case, settled, all_of[0].late_s, all_of[0].start_s)
             if (lag := lag_estimate(rig)) is not None:
                 found["settling_time"] += lag
@@ -89,7 +94,8 @@ def by_case(steps: list[Done], rig: RigFile, band: float) -> dict[Case, Result]:
             folded = aliased(found["bandwidth"].value, period)
             found["bandwidth"] += bound(f"aliasing/{case.where}", "above half the sampling rate", folded, "Hz")
         error = float(np.mean([_late(o) - 1 for o in ones[case]]))
-        out[case] = Result(case, ones[case], fits[case][0] if fits[case] else None, settled, error, found)
+        fitted = fits[case][0] if fits[case] else None
+        out[case] = Result(case, ones[case], fitted, settled, error, found, shared[case])
     return out
 
 
@@ -126,11 +132,14 @@ def _fits(ones: Sequence[One], tilting: Tilting) -> list[Swing]:
 
 
 def _curve(done: Sequence[Done], tilting: Tilting) -> Curve:
+    """Where nothing swings, of what fits best: what dies away too fast to swing is not what slow integrators leave."""
     try:
-        found = swing([_one(d) for d in done], tilting=tilting)
+        found = shape([_one(d) for d in done], tilting=tilting)
     except AnalysisError:
         return settling.fit(done, np.zeros(0, complex))
-    return settling.fit(done, found.poles, found.pole, found.constant)
+    if found.dies_away:
+        return settling.fit(done, found.poles, found.pole, found.constant)
+    return settling.fit(done, settling.fading(found.poles), constant=max(found.constant, 0.0))
 
 
 def settling_estimate(case: Case, settled: Settling, late: float = 0.0, start: float = START_S) -> Estimate:
@@ -178,7 +187,7 @@ def _oscillation(group: str, results: Sequence[Result], rig: RigFile, start: flo
     one step after the other, among those of its kind. Nothing where there is no oscillation.
 
     What is taken for granted of a second oscillation beside what fades fast moves both (`coupled`)."""
-    if any(leans(rig, r.case.axis) for r in results):
+    if any(r.shared for r in results):
         return {}
     ones, tilting = [o for r in results for o in r.ones], tilting_of(rig)
     kinds, n = [(r.case, o.begin) for r in results for o in r.ones], len(ones)
@@ -222,9 +231,9 @@ def _oscillation(group: str, results: Sequence[Result], rig: RigFile, start: flo
     return out
 
 
-def one_group(group: str, results: Mapping[Case, Result], rig: RigFile) -> list[One]:
+def one_group(group: str, results: Mapping[Case, Result]) -> list[One]:
     """All steps of a setting, an axis and a speed; none where y and z share two oscillations."""
-    return [o for c, r in results.items() if c.group == group and not leans(rig, c.axis) for o in r.ones]
+    return [o for c, r in results.items() if c.group == group and not r.shared for o in r.ones]
 
 
 def _first_order(results: Sequence[Result]) -> float:

@@ -20,18 +20,27 @@ APART = (1.0, 0.2), (1.06, 0.25)  # start of the search: frequencies over the gu
 
 
 def swing(steps: Sequence[One], start: Swing | None = None, tilting: Tilting = ANY) -> Swing:
-    """Of many steps together. Two oscillations, or one where the tilt says nothing, and what fades fast where something does;
-    what is linear in the model is eliminated (variable projection). `start`: a fit to nearly the same steps; `tilting`: what is
-    known of the shaft's.
+    """`shape` of steps that swing.
 
     Raises:
-        AnalysisError: no oscillation fits.
+        AnalysisError: no oscillation fits, or it does not die away.
     """
-    constant = fading_s(steps) if start is None else start.constant
-    out = coupled.fitted(steps, constant, start, tilting) if constant else _fitted(steps, start)
+    out = shape(steps, start, tilting)
     if not out.dies_away:
         raise AnalysisError("no oscillation that dies away fits the response")
     return out
+
+
+def shape(steps: Sequence[One], start: Swing | None = None, tilting: Tilting = ANY) -> Swing:
+    """Of many steps together. Two oscillations, or one where the tilt says nothing, and what fades fast where something does;
+    what is linear in the model is eliminated (variable projection). `start`: a fit to nearly the same steps; `tilting`: what is
+    known of the shaft's. Where nothing swings it is what fits best, whatever that is.
+
+    Raises:
+        AnalysisError: the search goes astray.
+    """
+    constant = fading_s(steps) if start is None else start.constant
+    return coupled.fitted(steps, constant, start, tilting) if constant else _fitted(steps, start)
 
 
 @dataclass(frozen=True)

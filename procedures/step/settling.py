@@ -29,7 +29,7 @@ FROM_S = 8e-3  # filters, current loops and second harmonics of the swing are th
 # Time constants of what fades without swinging: the shortest, the ratio of the next to it, how many. 2.5 apart they miss what a
 # PID leaves by 0.015 % of the step, 4 ms of its settling time.
 FADES_S, APART, FADES = 0.1, 1.6, 12
-HARD_S = (0.01, 0.03)  # such constants too where nothing swings
+HARD_S = tuple(0.01 * APART**k for k in range(5))  # such constants too where nothing swings
 BAND_NOISE = 5.0  # of settling, at least, over the noise of the averaged position
 NEAR = 3.0  # standard uncertainties from the band's edge within which an extreme is not told from one that touches it
 DRAWS, FEW, PARTS = 1000, 20, 20  # PARTS: of the draws, of which one is in memory at a time
@@ -93,6 +93,11 @@ def lasting(poles: Complex) -> Complex:
     """Poles as they can be over a whole record. The part of an oscillation that position hardly has is noise, and so is its
     pole: over the first swings it may grow, over the record nothing did. It is then one that does not die away."""
     return np.asarray(np.minimum(poles.real, 0.0) + 1j * poles.imag)
+
+
+def fading(poles: Complex) -> Complex:
+    """Those that die away, and are not dead before a curve begins."""
+    return poles[(poles.real < 0) & (-poles.real * FROM_S < math.log(1 / DEAD))]
 
 
 def fit(steps: Sequence[Done], poles: Complex, middle: complex | None = None, constant: float = 0.0) -> Curve:

@@ -13,7 +13,7 @@ from bench.uncertainty import Estimate
 from procedures.step.coupled import hardly_swings
 from procedures.step.estimates import Result, one_group
 from procedures.step.fit import swing
-from procedures.step.position import leans, tilting_of
+from procedures.step.position import tilting_of
 from procedures.step.response import SCAN_HZ
 from procedures.step.steps import Case
 
@@ -26,6 +26,17 @@ AGAIN = "Repeat more often, take larger steps, or faster telemetry."
 ASTRAY = (
     "not without one of them, or not with what is taken for granted of a second oscillation a little off, so that nothing "
     "says how uncertain it is"
+)
+
+OBLIQUE = (
+    "the axes of a bearing are not at right angles and each has a control of its own: a step along y or z swings "
+    "along both, with two oscillations that lie far apart. One is what would be fitted: overshoot, settling, "
+    "bandwidth, damping and frequency are not told; rise and error are."
+)
+GYROSCOPIC = (
+    "the shaft turns, and a step along one axis swings along the other one too, as where the centre of mass is beyond the "
+    "bearings and gyroscopic moments turn a tilt: y and z share four oscillations. Two are what would be fitted: overshoot, "
+    "settling, bandwidth, damping and frequency are not told; rise and error are."
 )
 
 
@@ -41,7 +52,7 @@ def groups(results: Mapping[Case, Result], told: Mapping[str, Mapping[str, Estim
     """Those of the groups `told` that tell no damping though an oscillation fits all of their steps."""
     out = {}
     for group in (name for name, found in told.items() if "damping" not in found):
-        ones = one_group(group, results, rig)
+        ones = one_group(group, results)
         try:
             if ones:
                 out[group] = Why.TORN if hardly_swings(swing(ones, tilting=tilting_of(rig))) else Why.ASTRAY
@@ -57,7 +68,7 @@ def find_untold(
     named: set[str] = set()
     for case, result in results.items():
         lacking = [q for q in OF_CASE if q not in result.estimates]
-        if not lacking or leans(rig, case.axis):
+        if not lacking or result.shared:
             continue
         concerned = [f"{q}@{case.where}" for q in lacking]
         if case.group not in named and "overshoot" in lacking:

@@ -84,10 +84,15 @@ def test_unbalance_of_a_shaft_whose_bearings_carry_unlike_loads(inclined: tuple[
 def test_parts_that_say_another_unbalance_are_told(inclined: tuple[Result, dict[str, float]]) -> None:
     b = inclined[0].balance
     base = b.trials.base
-    read, speeds, whole = readings(base) / b.gain, [r.speed for r in base.reads], b.unbalance[base.name]
-    assert not list(apart.parts_apart(b.solved, read, speeds, whole, b.planes))
+    read, whole = readings(base) / b.gain, b.unbalance[base.name]
+    assert not list(apart.parts_apart(b.apart, whole, b.planes))
     blind = dataclasses.replace(b.solved, beside=0 * b.solved.beside)
-    wrong = dataclasses.replace(whole, values=blind.unbalance(read))
-    found = list(apart.parts_apart(blind, read, speeds, wrong, b.planes))
+    wrong = blind.unbalance(read)
+    moved = {}
+    for name, part in apart.parts_of([r.speed for r in base.reads]).items():
+        by = apart.share_of(blind, part) * (apart.said(blind, read, part) - wrong)
+        told = np.array([p.told(complex(x)) for p, x in zip(b.planes, by, strict=True)])
+        moved[name] = (dataclasses.replace(b.apart[name][0], values=told), b.apart[name][1])
+    found = list(apart.parts_apart(moved, dataclasses.replace(whole, values=wrong), b.planes))
     assert {f.code for f in found} == {"unbalances-apart"}
     assert {"probes along y", "readings at 4772 r/min"} <= {f.where for f in found}

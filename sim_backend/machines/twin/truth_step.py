@@ -17,6 +17,7 @@ from sim_backend.machines.twin.quiet import Floating, Sight, floating
 from sim_backend.motion import StepsAsked
 
 Array = npt.NDArray[np.float64]
+REPEATS = 8  # of a small step round a revolution
 
 
 def steps_asked(rig: RigFile, drawn: Truth, asked: StepsAsked) -> tuple[Small, dict[tuple[float, int], Shown]]:
@@ -30,8 +31,8 @@ def steps_asked(rig: RigFile, drawn: Truth, asked: StepsAsked) -> tuple[Small, d
         Floating(plant, made.parameters.on(plant)).write(asked.points(end))
 
     of = Watched(asked.axis, sight.shaft, write, plant.tick_s)
-    of_small = small(plant, of)
     turn_s = 2 * math.pi / asked.speed if asked.speed else 0.0
+    of_small = small(plant, of, REPEATS, turn_s) if turn_s else small(plant, of)
     out: dict[tuple[float, int], Shown] = {}
     for size in sorted(asked.sizes):
         shown = steps(plant, of, size, asked.rest_s, asked.record_s, wait_s=asked.wait_s, turn_s=turn_s)
