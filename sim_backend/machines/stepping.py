@@ -111,7 +111,9 @@ def steps(
     """Up, back, down and back, after `wait_s` and `rest_s`: by way (1 up, -1 down) what they show together; `turn_s` of a
     revolution, 0 at rest. Where the shaft turns, the mean of steps at PHASES of its revolution, since unbalance makes the
     bearings' slopes go with it."""
-    if turn_s:  # as it truly turns: a mean over a revolution that is 2e-4 too short keeps half a nanometre of an orbit of 2 µm
+    if (
+        turn_s
+    ):  # as it truly turns: a mean over a revolution that is 2e-4 too short keeps half a nanometre of an orbit of 2 µm
         turn_s = 2 * math.pi / plant.shaft_speed
     responses: dict[int, list[Array]] = {1: [], -1: []}
     errors: dict[int, list[float]] = {1: [], -1: []}

@@ -1,4 +1,4 @@
-"""Oblique axes are told by what a case is of, whatever a setting is called."""
+"""Axes that share oscillations are told case by case, whatever a setting is called, and why."""
 
 from __future__ import annotations
 
@@ -11,13 +11,16 @@ from procedures.step import checks
 from procedures.step.plan import Plan
 from procedures.step.steps import Case
 
-SOUND = SimpleNamespace(settled=SimpleNamespace(open=False, time=0.1, within=0.01), error=0.0)
+SETTLED = SimpleNamespace(open=False, time=0.1, within=0.01)
 
 
 @pytest.mark.parametrize("setting", ["A", "soft, x, slow"])
-@pytest.mark.parametrize(("axis", "told"), [("y", ["axes-oblique"]), ("z", ["axes-oblique"]), ("x", [])])
-def test_the_axis_is_the_case_s_own(setting: str, axis: str, told: list[str]) -> None:
-    case = Case(setting, 0.0, axis, 1e-5, 1)
+@pytest.mark.parametrize(
+    ("shared", "leaning", "told"),
+    [(True, True, ["axes-oblique"]), (True, False, ["gyroscopic"]), (False, True, []), (False, False, [])],
+)
+def test_what_axes_share_is_the_case_s_own(setting: str, shared: bool, leaning: bool, told: list[str]) -> None:
+    case, result = Case(setting, 0.0, "y", 1e-5, 1), SimpleNamespace(settled=SETTLED, error=0.0, shared=shared)
     group: Any = {case.group: {"damping": None}}
-    found = checks.of_results({case: cast(Any, SOUND)}, group, Plan(), leaning=True)
+    found = checks.of_results({case: cast(Any, result)}, group, Plan(), leaning=leaning)
     assert [f.code for f in found] == told
