@@ -15,11 +15,11 @@ from bench.uncertainty import Estimate, Influence
 from bench.uncertainty.estimate import Deviations
 from procedures.amb_rotor import loops
 from procedures.shared.certificates import certified
-from procedures.step import response, settling
+from procedures.step import fit, response, settling
 from procedures.step import steps as step_steps
 from procedures.step.acting import START_S
 from procedures.step.coupled import Tilting, hardly_swings
-from procedures.step.fit import shape, swing
+from procedures.step.fit import swing
 from procedures.step.oscillation import One, Swing
 from procedures.step.position import leans, shares, tilting_of
 from procedures.step.rising import rises
@@ -111,7 +111,8 @@ def harmonic_left(difference: float, swing: Swing) -> float:
     Quadratic forces of a loaded bearing make the directions differ by another stiffness where they end, which each direction's
     own poles have, and by a second harmonic, which they have not: it goes with the square of the swing at its top, half a swing
     after the step: e^(2 pi Re p/Im p)."""
-    return HARMONIC * math.exp(2 * math.pi * swing.pole.real / swing.pole.imag) * abs(difference)
+    last = swing.last
+    return HARMONIC * math.exp(2 * math.pi * last.real / last.imag) * abs(difference) if last.imag else 0.0
 
 
 def _one(d: Done) -> One:
@@ -125,8 +126,11 @@ def _late(o: One) -> float:
 def _fits(ones: Sequence[One], tilting: Tilting) -> list[Swing]:
     """Of all steps of a case, then without each in turn; nothing where one does not fit."""
     try:
-        whole = swing(ones, tilting=tilting)
-        return [whole, *(swing([o for j, o in enumerate(ones) if j != k], whole, tilting) for k in range(len(ones)))]
+        whole = fit.response(ones, tilting=tilting)
+        return [
+            whole,
+            *(fit.response([o for j, o in enumerate(ones) if j != k], whole, tilting) for k in range(len(ones))),
+        ]
     except AnalysisError:
         return []
 
@@ -134,7 +138,7 @@ def _fits(ones: Sequence[One], tilting: Tilting) -> list[Swing]:
 def _curve(done: Sequence[Done], tilting: Tilting) -> Curve:
     """Where nothing swings, of what fits best: what dies away too fast to swing is not what slow integrators leave."""
     try:
-        found = shape([_one(d) for d in done], tilting=tilting)
+        found = fit.shape([_one(d) for d in done], tilting=tilting)
     except AnalysisError:
         return settling.fit(done, np.zeros(0, complex))
     if found.dies_away:
@@ -239,7 +243,11 @@ def one_group(group: str, results: Mapping[Case, Result]) -> list[One]:
 def _first_order(results: Sequence[Result]) -> float:
     """By how much the frequency of the largest steps differs between the directions: 0 in a linear loop."""
     largest = max(r.case.size for r in results)
-    both = {r.case.way: r.swing.frequency for r in results if r.case.size == largest and r.swing is not None}
+    both = {
+        r.case.way: r.swing.frequency
+        for r in results
+        if r.case.size == largest and r.swing is not None and r.swing.dies_away
+    }
     return both[1] / both[-1] - 1 if len(both) == 2 else 0.0
 
 

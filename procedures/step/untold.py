@@ -85,5 +85,5 @@ def find_untold(
 
 def _reason(result: Result) -> str:
     if result.swing is None:
-        return "no oscillation that dies away fits these steps, or none fits without one of them"
+        return "no response that comes to rest fits these steps, or none without one of them"
     return f"the gain does not fall by 3 dB up to {SCAN_HZ[-1]:g} Hz, or not without one of these steps"

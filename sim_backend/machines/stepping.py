@@ -28,6 +28,9 @@ BAND_S = 0.25, 0.5, 1.0  # of the response that makes the bandwidth: the first t
 CALM = 0.01  # of the step, over the last fifth of it
 SCANNED = 40  # the first line of the response that is looked at: 20 Hz, where the procedure begins
 PHASES = 3  # of the revolution, at which steps begin: what goes with one or two a turn has no mean
+ROUND = range(
+    1, 9
+)  # orders that small motions of a turning shaft are freed of: with two a pole damped by .73 was told .66
 COORDINATES = "yzx"
 
 
@@ -221,8 +224,8 @@ def small(plant: Any, of: Watched, repeats: int = 1, turn_s: float = 0.0) -> Sma
 
 
 def _of_mean(phases: Array) -> Array:
-    """Weights (n,) by which responses that begin at `phases` (n,) of a revolution have a mean: a fit of it with two orders."""
-    orders = [f(n * phases) for n in (1, 2) for f in (np.cos, np.sin)]
+    """Weights (n,) by which responses that begin at `phases` (n,) have a mean: by a fit of it and the orders ROUND."""
+    orders = [f(n * phases) for n in ROUND for f in (np.cos, np.sin)]
     return np.asarray(np.linalg.pinv(np.column_stack([np.ones_like(phases), *orders]))[0])
 
 

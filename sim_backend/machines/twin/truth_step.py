@@ -17,7 +17,7 @@ from sim_backend.machines.twin.quiet import Floating, Sight, floating
 from sim_backend.motion import StepsAsked
 
 Array = npt.NDArray[np.float64]
-REPEATS = 8  # of a small step round a revolution
+REPEATS = 32  # of a small step round a revolution
 
 
 def steps_asked(rig: RigFile, drawn: Truth, asked: StepsAsked) -> tuple[Small, dict[tuple[float, int], Shown]]:
