@@ -5,7 +5,8 @@
 
 Mass, inertias, centre of mass, the places of bearings and probes (those of one plane apart as well), the angles of the axes, of
 each bearing by itself, right-handed or left-handed or oblique, and the magnets' strength are others; the spindle leans as well.
-Names, messages and tolerances are the example's. Some of them `bench check` refuses, and some fly with no room left: what is
+Names, messages and tolerances are the example's. From LOOPS on a spindle's gains, noise, unbalance and runout are others too,
+and some tell no loop delay. Some of them `bench check` refuses, and some fly with no room left: what is
 looked for is a value that is off in silence.
 """
 
@@ -21,6 +22,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1] / "examples"
 EXAMPLES = {"spindle": ROOT / "vertical-spindle/spindle.toml", "stand": ROOT / "plain-stand/stand.toml"}
 Text = str
+LOOPS = 1000  # the first number whose spindles have loops of their own
 
 
 def main() -> None:
@@ -46,7 +48,9 @@ def drawn(example: str, number: int) -> Text:
     text = EXAMPLES[example].read_text(encoding="utf-8")
     text = re.sub(r'^name = ".*"', f'name = "{example}{number}"', text, count=1, flags=re.MULTILINE)
     draw = random.Random(number)
-    return _spindle(text, draw) if example == "spindle" else _stand(text, draw)
+    if example == "stand":
+        return _stand(text, draw)
+    return _loops(_spindle(text, draw), draw) if number >= LOOPS else _spindle(text, draw)
 
 
 def _spindle(text: Text, r: random.Random) -> Text:
@@ -64,6 +68,22 @@ def _spindle(text: Text, r: random.Random) -> Text:
     for probe, at in (("LowU", 60), ("LowV", 0), ("UppU", 362), ("UppV", 0)):
         text = _put(text, f"{probe} = {{ channel", at + r.uniform(-12, 10))
     return _put(text, "beta = ", 6.6e-7 * heavy * r.uniform(0.8, 1.5))
+
+
+def _loops(text: Text, r: random.Random) -> Text:
+    for bearing in ("Lower", "Upper"):
+        for gain, few, most in (("Kp", 0.8, 1.4), ("Ki", 0.15, 1.2), ("Kd", 0.6, 1.5)):
+            text = _scaled(text, f"{gain}{bearing} = ", "default", r.uniform(few, most))
+    loud = {"Disp": 10 ** r.uniform(-0.5, 0.8), "Coil": 10 ** r.uniform(-0.5, 0.5)}
+    for channels, factor in loud.items():
+        text = re.sub(rf"^({channels}\w+ = .*noise = )([^,}} ]+)", lambda m, f=factor: f"{m[1]}{float(m[2]) * f:.4g}", text,
+                      flags=re.MULTILINE)  # fmt: skip
+    text = re.sub(r"^position_noise = .*", f"position_noise = {1e-7 * loud['Disp']:.4g}", text, flags=re.MULTILINE)
+    text = re.sub(r"^current_noise = .*", f"current_noise = {2e-3 * loud['Coil']:.4g}", text, flags=re.MULTILINE)
+    text = _scaled(text, "runout = ", "u", r.uniform(0.3, 3))
+    heavy = 10 ** r.uniform(-0.7, 0.5)
+    text = _scaled(_scaled(text, "unbalance = ", "value", heavy), "unbalance = ", "half_width", heavy)
+    return re.sub(r"^loop_delay = .*\n", "", text, flags=re.MULTILINE) if r.random() < 0.3 else text
 
 
 def _stand(text: Text, r: random.Random) -> Text:
@@ -102,6 +122,15 @@ def _section(text: Text, bearing: str, change: Callable[[Text], Text]) -> Text:
     start = text.index(f"[bearings.{bearing}]")
     end = text.index("\n[", start + 1)
     return text[:start] + change(text[start:end]) + text[end:]
+
+
+def _scaled(text: Text, line: str, key: str, factor: float) -> Text:
+    """The first line that begins so with `key` times as much."""
+    found, count = re.subn(rf"^({re.escape(line)}.*?\b{key} = )([^,}} ]+)", lambda m: f"{m[1]}{float(m[2]) * factor:.6g}",
+                           text, count=1, flags=re.MULTILINE)  # fmt: skip
+    if not count:
+        raise SystemExit(f"found no line {line!r} with {key}")
+    return found
 
 
 def _put(text: Text, line: str, value: float) -> Text:

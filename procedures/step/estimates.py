@@ -20,6 +20,7 @@ from procedures.step import steps as step_steps
 from procedures.step.acting import START_S
 from procedures.step.coupled import Tilting, hardly_swings
 from procedures.step.fit import swing
+from procedures.step.likeness import followed, follows
 from procedures.step.oscillation import One, Swing
 from procedures.step.position import leans, shares, tilting_of
 from procedures.step.rising import rises
@@ -39,6 +40,7 @@ HARMONIC = 0.45
 # less by this much, since what bearings have of quadratic and cubic forces softens them (Landau, Mechanics, section 28).
 SIZE_DAMPING, SIZE_FREQUENCY = (-2.0, 2.0), (-4.0, 0.0)
 TAIL_S = 0.2
+ALONE = np.array([[1.0], [0.0]])  # of position and tilt, the position
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,7 @@ def by_case(steps: list[Done], rig: RigFile, band: float) -> dict[Case, Result]:
     together = {g: leans(rig, of[0].case.axis) or whirls(of) for g, of in step_steps.by_group(steps).items()}
     shared = {case: together[case.group] for case in ones}
     fits = {case: [] if shared[case] else _fits(o, tilting) for case, o in ones.items()}
+    fits = followed(fits, ones)
     rising, left = rises(ones, {case.group for case, of in done.items() if of[0].late_s})
     seen = {
         "rise_time": rising,
@@ -111,8 +114,7 @@ def harmonic_left(difference: float, swing: Swing) -> float:
     Quadratic forces of a loaded bearing make the directions differ by another stiffness where they end, which each direction's
     own poles have, and by a second harmonic, which they have not: it goes with the square of the swing at its top, half a swing
     after the step: e^(2 pi Re p/Im p)."""
-    last = swing.last
-    return HARMONIC * math.exp(2 * math.pi * last.real / last.imag) * abs(difference) if last.imag else 0.0
+    return HARMONIC * math.exp(2 * math.pi * swing.pole.real / swing.pole.imag) * abs(difference)
 
 
 def _one(d: Done) -> One:
@@ -126,24 +128,30 @@ def _late(o: One) -> float:
 def _fits(ones: Sequence[One], tilting: Tilting) -> list[Swing]:
     """Of all steps of a case, then without each in turn; nothing where one does not fit."""
     try:
-        whole = fit.response(ones, tilting=tilting)
+        whole = swing(ones, tilting=tilting)
         return [
             whole,
-            *(fit.response([o for j, o in enumerate(ones) if j != k], whole, tilting) for k in range(len(ones))),
+            *(swing([o for j, o in enumerate(ones) if j != k], whole, tilting) for k in range(len(ones))),
         ]
     except AnalysisError:
         return []
 
 
 def _curve(done: Sequence[Done], tilting: Tilting) -> Curve:
-    """Where nothing swings, of what fits best: what dies away too fast to swing is not what slow integrators leave."""
+    """Where nothing swings, of what fits best: what dies away too fast to swing is not what slow integrators leave. Where the
+    search for two oscillations goes astray, with one of the position alone."""
+    ones = [_one(d) for d in done]
     try:
-        found = fit.shape([_one(d) for d in done], tilting=tilting)
+        found = fit.shape(ones, tilting=tilting)
     except AnalysisError:
-        return settling.fit(done, np.zeros(0, complex))
+        try:
+            found = fit.shape([replace(o, both=o.both * ALONE) for o in ones])
+        except AnalysisError:
+            return settling.fit(done, np.zeros(0, complex))
+    constant = max(found.constant, 0.0)
     if found.dies_away:
-        return settling.fit(done, found.poles, found.pole, found.constant)
-    return settling.fit(done, settling.fading(found.poles), constant=max(found.constant, 0.0))
+        return settling.fit(done, found.poles, found.pole, constant, found.unlike)
+    return settling.fit(done, settling.fading(found.poles), None, constant, found.unlike)
 
 
 def settling_estimate(case: Case, settled: Settling, late: float = 0.0, start: float = START_S) -> Estimate:
@@ -201,6 +209,8 @@ def _oscillation(group: str, results: Sequence[Result], rig: RigFile, start: flo
             return {}  # `untold` says which
         left = [swing(ones[:k] + ones[k + 1 :], whole, tilting) for k in range(n)]
     except AnalysisError:
+        return {}
+    if any(r.swing is None for r in results) and not follows([(whole, r.ones) for r in results]):
         return {}
     first, lag = _first_order(results), lag_estimate(rig)
     shares = np.array([o.weight**2 for o in ones])

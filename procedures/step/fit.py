@@ -31,18 +31,6 @@ def swing(steps: Sequence[One], start: Swing | None = None, tilting: Tilting = A
     return out
 
 
-def response(steps: Sequence[One], start: Swing | None = None, tilting: Tilting = ANY) -> Swing:
-    """`shape` of steps that come to rest, be it without an oscillation.
-
-    Raises:
-        AnalysisError: the search goes astray, or what it finds grows.
-    """
-    out = shape(steps, start, tilting)
-    if not out.comes_to_rest:
-        raise AnalysisError("what fits the response does not come to rest")
-    return out
-
-
 def shape(steps: Sequence[One], start: Swing | None = None, tilting: Tilting = ANY) -> Swing:
     """Of many steps together. Two oscillations, or one where the tilt says nothing, and what fades fast where something does;
     what is linear in the model is eliminated (variable projection). `start`: a fit to nearly the same steps; `tilting`: what is

@@ -97,18 +97,6 @@ class Swing:
         """Whether there is an oscillation, and it does."""
         return bool(np.isfinite(self.pole) and 0 < self.damping < HARD and self.pole.imag > 0 and self.constant >= 0)
 
-    @property
-    def comes_to_rest(self) -> bool:
-        """Whether it is the response of a shaft that does, be it without an oscillation."""
-        return self.dies_away or bool(
-            self.constant >= 0 and np.isfinite(self.parts).all() and (self.poles.real < 0).all()
-        )
-
-    @property
-    def last(self) -> complex:
-        """How it goes on behind what was fitted: with the mean pole, or where nothing swings with the one that carries most."""
-        return self.pole if np.isfinite(self.pole) else self._lead(np.ones(len(self.poles), bool))
-
     def later(self, by: float) -> Swing:
         """The same with its parts as of `by` s later."""
         return replace(self, parts=self.parts * np.exp(self.poles * by))
@@ -125,10 +113,10 @@ class Swing:
         return np.asarray(line + (self.fades + self.apart * late**2) * shrunk * np.exp(-late))
 
     def means(self, t: Array, period: float) -> Array:
-        """Means over the period before t; beyond what was fitted (where one of the two may even grow) with the `last` pole."""
+        """Means over the period before t; beyond what was fitted (where one of the two may even grow) with the mean pole."""
         parts = self.parts * shrinks(self.poles, period)
         swung = np.exp(np.outer(np.minimum(t, UNTIL_S), self.poles)) @ parts
-        swung *= np.exp(self.last * np.maximum(t - UNTIL_S, 0.0))
+        swung *= np.exp(self.pole * np.maximum(t - UNTIL_S, 0.0))
         if self.constant:
             shrunk = float(shrinks(np.array([-1 / self.constant + 0j]), period)[0].real)
             return np.asarray(self._slow(t, shrunk) + swung.real)

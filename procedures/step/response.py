@@ -21,6 +21,7 @@ FINE = 20  # points of the curve in a telemetry period
 RAW_S = 8e-3  # until then the bandwidth is that of the samples, from then on of the oscillation that was fitted to them
 LENGTH_S = 0.12  # of the response that makes the bandwidth, at least
 LASTS = 7.0  # time constants of its slowest oscillation: what is cut off behind them is 0.1 % of a swing
+TOUCHES = 0.03  # of 0.707, that a dip may be nearer than
 SCAN_HZ = np.arange(20.0, 480.0, 2.0)
 
 
@@ -80,7 +81,8 @@ def trailing(y: Array, samples: float) -> Array:
 
 def bandwidth(steps: Sequence[One], swing: Swing) -> float:
     """Hz where the gain from set point to position first falls below 0.707, by the steps' mean; infinite beyond the scan. A
-    bending mode far above may lift it again: that is no band in which the shaft follows."""
+    bending mode far above may lift it again: that is no band in which the shaft follows. A dip that only just touches 0.707, or
+    just does not, is told by noise (95 Hz for 206): then it is not a number."""
     period = float(steps[0].t[1] - steps[0].t[0])
     count = round(max(LENGTH_S, LASTS * swing.lasting) / period)
     turns = np.exp(-2j * np.pi * period * np.outer(SCAN_HZ, np.arange(count)))
@@ -96,4 +98,10 @@ def bandwidth(steps: Sequence[One], swing: Swing) -> float:
     if not len(falls):
         return math.inf
     k = int(falls[0])
+    again = np.flatnonzero(whole[k + 1 :] >= math.sqrt(0.5))
+    dips = [whole[k + 1 : k + 1 + int(again[0])].min()] if len(again) else []
+    inner = whole[1:k]
+    dips += list(inner[(inner <= whole[: k - 1]) & (inner <= whole[2 : k + 1])]) if k > 1 else []
+    if any(abs(x / math.sqrt(0.5) - 1) < TOUCHES for x in dips):
+        return math.nan
     return float(np.interp(-math.sqrt(0.5), -whole[k : k + 2], SCAN_HZ[k : k + 2]))

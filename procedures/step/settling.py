@@ -100,10 +100,12 @@ def fading(poles: Complex) -> Complex:
     return poles[(poles.real < 0) & (-poles.real * FROM_S < math.log(1 / DEAD))]
 
 
-def fit(steps: Sequence[Done], poles: Complex, middle: complex | None = None, constant: float = 0.0) -> Curve:
+def fit(
+    steps: Sequence[Done], poles: Complex, middle: complex | None = None, constant: float = 0.0, unlike: bool = False
+) -> Curve:
     """Of steps of one setting, axis and speed; `poles` of their swing, none where nothing swings, and the `middle` of these,
     each with its part in the swing (their mean where none is given); the time `constant` of what fades fast, 0 where nothing
-    does.
+    does; `unlike`: it is that of two things together, of which one is faster.
 
     Each step is fitted alone, then its terms over size and beginning. Noise that swings is taken from what the fits leave,
     over all times; what fades from the scatter of its terms, since a level's noise is slower than a record.
@@ -113,7 +115,7 @@ def fit(steps: Sequence[Done], poles: Complex, middle: complex | None = None, co
     """
     last = min(float(d.t[-1]) for d in steps)
     fades = tuple(float(f) for f in FADES_S * APART ** np.arange(FADES) if f <= last)
-    fades = (*_faster(constant), *fades)
+    fades = (*_faster(constant / APART**2 if unlike else constant), *fades)
     fades = fades if len(poles) else (*HARD_S, *fades)
     poles = lasting(poles)
     middle = middle if middle is not None else complex(poles.mean()) if len(poles) else 0j

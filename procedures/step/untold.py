@@ -24,8 +24,8 @@ OF_CASE, OF_SIZES, OF_GROUP = (
 )
 AGAIN = "Repeat more often, take larger steps, or faster telemetry."
 ASTRAY = (
-    "not without one of them, or not with what is taken for granted of a second oscillation a little off, so that nothing "
-    "says how uncertain it is"
+    "not without one of them, not with what is taken for granted of a second oscillation a little off, or they do not follow "
+    "it, so that nothing says how uncertain it is"
 )
 
 OBLIQUE = (
@@ -85,5 +85,8 @@ def find_untold(
 
 def _reason(result: Result) -> str:
     if result.swing is None:
-        return "no response that comes to rest fits these steps, or none without one of them"
-    return f"the gain does not fall by 3 dB up to {SCAN_HZ[-1]:g} Hz, or not without one of these steps"
+        return "no oscillation that dies away fits these steps, none without one of them, or they do not follow it"
+    return (
+        f"the gain does not fall by 3 dB up to {SCAN_HZ[-1]:g} Hz, not without one of these steps, or it dips to just that "
+        "below another crossing"
+    )

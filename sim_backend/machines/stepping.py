@@ -179,7 +179,10 @@ class Small:
     @property
     def pole(self) -> complex:
         """Of the oscillation as it begins: the mean of the poles, each with its part, of the one that carries most, by the
-        integral of its square, and of those that are near it. What lies farther is another oscillation."""
+        integral of its square, and of those that are near it. What lies farther is another oscillation. Not a number where
+        nothing swings."""
+        if not len(self.poles):
+            return complex(math.nan)
         lead = self.poles[int(np.argmax(np.abs(self.parts) ** 2 / -self.poles.real))]
         near = np.abs(self.poles - lead) < OF_ITS_OWN * np.abs(lead)
         return complex((self.parts * self.poles)[near].sum() / self.parts[near].sum())

@@ -13,6 +13,7 @@ from bench.cli.virtual import simulated_run
 from bench.findings import Effect, Finding
 from bench.procedure import Measured
 from bench.uncertainty import interval
+from benchmarks.drawn_rigs import EXAMPLES, drawn
 from procedures.balance import apart, loop
 from procedures.balance.estimates import Result, readings
 from procedures.synchronous import runout
@@ -96,3 +97,13 @@ def test_parts_that_say_another_unbalance_are_told(inclined: tuple[Result, dict[
     found = list(apart.parts_apart(moved, dataclasses.replace(whole, values=wrong), b.planes))
     assert {f.code for f in found} == {"unbalances-apart"}
     assert {"probes along y", "readings at 4772 r/min"} <= {f.where for f in found}
+
+
+def test_bearings_that_are_turned_to_each_other_make_no_parts_apart(tmp_path: Path) -> None:
+    """What nobody knows of their stiffness moves the probes along y one way and those along z the other: by the uncertainty of
+    the whole they were 3.0 apart on this sound spindle, 2.4 by that of their difference."""
+    path, dbc = tmp_path / "drawn.toml", next(EXAMPLES["spindle"].parent.glob("*.dbc"))
+    path.write_text(drawn("spindle", 17), encoding="utf-8")
+    (tmp_path / dbc.name).write_bytes(dbc.read_bytes())
+    run = simulated_run("balance", str(path), 1, {}, tmp_path / "run.mcap")
+    assert [f.code for f in run.results if isinstance(f, Finding) and f.effect is not Effect.NOTE] == []

@@ -43,8 +43,9 @@ def step(done: Simulated) -> Found:
                 small, shown = steps(rig, done.drawn, asked)
                 cases = {key: Case(setting, speed, axis, *key) for key in shown}
                 group = next(iter(cases.values())).group
-                yield "damping", group, small.damping
-                yield "natural_frequency", group, small.frequency
+                if math.isfinite(small.frequency):
+                    yield "damping", group, small.damping
+                    yield "natural_frequency", group, small.frequency
                 for key, of in shown.items():
                     for name in ("overshoot", "rise_time", "steady_error", "bandwidth"):
                         yield name, cases[key].where, getattr(of, name)

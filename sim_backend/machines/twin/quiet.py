@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from bench.errors import AnalysisError
 from bench.rigfile import RigFile
 from sim_backend.controller.parameters import Parameters
 from sim_backend.core import LEVITATE, LIFT, READY, DriveLaw
@@ -54,7 +55,11 @@ def floating(
     change: Callable[[TwinParams], TwinParams] = quiet,
 ) -> Floating:  # fmt: skip
     """Lifted as its controller begins, then with `settings` (every parameter, SI), at `speed` rad/s, its integrators at rest;
-    what is told is told as wired. The plant is what `change` makes of the drawn one."""
+    what is told is told as wired. The plant is what `change` makes of the drawn one.
+
+    Raises:
+        AnalysisError: it does not lift.
+    """
     p = dataclasses.replace(change(drawn.plant), names=told_of(rig, {}))
     plant = TwinPlant(p, drawn.noise)
     made = Floating(plant, Parameters(rig, drawn, plant, strict=False))
@@ -65,6 +70,10 @@ def floating(
         if plant.moved:
             break
         plant.run(round(REST_S / p.tick))
+    if not plant.moved:
+        raise AnalysisError(
+            f"rig {rig.name}: found a shaft that does not lift without its noise; expected one that floats"
+        )
     plant.mode = LEVITATE
     if speed:
         turn(plant, speed)
