@@ -239,8 +239,10 @@ def of_results(
         if where in shared:
             coupled = [f"{q}@{c.where}" for c in results if c.group == where for q in (*OF_CASE, "settling_time")]
             coupled += [f"{q}@{where}" for q in (*OF_SIZES, *OF_GROUP)]
-            code, text = ("axes-oblique", OBLIQUE) if leaning else ("gyroscopic", GYROSCOPIC)
-            yield Finding(code, text, where, concerns=tuple(coupled))
+            if leaning:  # of such a rig these quantities are optional
+                yield Finding("axes-oblique", OBLIQUE, where, concerns=tuple(coupled))
+            else:
+                yield Finding("gyroscopic", GYROSCOPIC, where, Effect.INDETERMINATE, tuple(coupled))
         elif untold.get(where) is Why.TORN:
             text = (
                 "two oscillations share the response, and one of them is damped so heavily that it hardly swings, as where one "
