@@ -20,7 +20,7 @@ from procedures.step import steps as step_steps
 from procedures.step.acting import START_S
 from procedures.step.coupled import Tilting, hardly_swings
 from procedures.step.fit import swing
-from procedures.step.likeness import followed, follows
+from procedures.step.likeness import astray
 from procedures.step.oscillation import One, Swing
 from procedures.step.position import leans, shares, tilting_of
 from procedures.step.rising import rises
@@ -47,7 +47,7 @@ ALONE = np.array([[1.0], [0.0]])  # of position and tilt, the position
 class Result:
     """The steps of one case, what was fitted to their mean (None: no oscillation), and each quantity with its influences; no
     settling time where the position does not settle. `shared`: y and z swing together, and what one oscillation would tell is
-    not told."""
+    not told; nor where the steps do not follow it (`follows`)."""
 
     case: Case
     ones: tuple[One, ...]
@@ -56,6 +56,7 @@ class Result:
     error: float
     estimates: Mapping[str, Estimate]
     shared: bool = False
+    follows: bool = True
 
 
 def by_case(steps: list[Done], rig: RigFile, band: float) -> dict[Case, Result]:
@@ -69,7 +70,8 @@ def by_case(steps: list[Done], rig: RigFile, band: float) -> dict[Case, Result]:
     together = {g: leans(rig, of[0].case.axis) or whirls(of) for g, of in step_steps.by_group(steps).items()}
     shared = {case: together[case.group] for case in ones}
     fits = {case: [] if shared[case] else _fits(o, tilting) for case, o in ones.items()}
-    fits = followed(fits, ones)
+    strayed = astray(fits, ones)
+    fits |= {case: [] for case in strayed}
     rising, left = rises(ones, {case.group for case, of in done.items() if of[0].late_s})
     seen = {
         "rise_time": rising,
@@ -98,7 +100,7 @@ def by_case(steps: list[Done], rig: RigFile, band: float) -> dict[Case, Result]:
             found["bandwidth"] += bound(f"aliasing/{case.where}", "above half the sampling rate", folded, "Hz")
         error = float(np.mean([_late(o) - 1 for o in ones[case]]))
         fitted = fits[case][0] if fits[case] else None
-        out[case] = Result(case, ones[case], fitted, settled, error, found, shared[case])
+        out[case] = Result(case, ones[case], fitted, settled, error, found, shared[case], case not in strayed)
     return out
 
 
@@ -199,7 +201,7 @@ def _oscillation(group: str, results: Sequence[Result], rig: RigFile, start: flo
     one step after the other, among those of its kind. Nothing where there is no oscillation.
 
     What is taken for granted of a second oscillation beside what fades fast moves both (`coupled`)."""
-    if any(r.shared for r in results):
+    if any(r.shared or not r.follows for r in results):
         return {}
     ones, tilting = [o for r in results for o in r.ones], tilting_of(rig)
     kinds, n = [(r.case, o.begin) for r in results for o in r.ones], len(ones)
@@ -209,8 +211,6 @@ def _oscillation(group: str, results: Sequence[Result], rig: RigFile, start: flo
             return {}  # `untold` says which
         left = [swing(ones[:k] + ones[k + 1 :], whole, tilting) for k in range(n)]
     except AnalysisError:
-        return {}
-    if any(r.swing is None for r in results) and not follows([(whole, r.ones) for r in results]):
         return {}
     first, lag = _first_order(results), lag_estimate(rig)
     shares = np.array([o.weight**2 for o in ones])

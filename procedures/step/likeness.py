@@ -20,14 +20,13 @@ FEWEST = 4  # samples in the first swings, with which nothing is told
 UNLIKE = 4.0  # of mean squares over those of scatter: 1 in the mean
 
 
-def followed(fits: Mapping[Case, list[Swing]], ones: Mapping[Case, Sequence[One]]) -> dict[Case, list[Swing]]:
-    """The fits of each case, the first of which is that of all its steps; none for those of an axis whose steps do not follow
-    them."""
-    out = dict(fits)
+def astray(fits: Mapping[Case, list[Swing]], ones: Mapping[Case, Sequence[One]]) -> set[Case]:
+    """Cases of the axes whose steps do not follow the fits to them, the first of which is that of all steps of a case."""
+    out: set[Case] = set()
     for group in {case.group for case in fits}:
         of = [case for case, found in fits.items() if case.group == group and found]
         if not follows([(fits[case][0], ones[case]) for case in of]):
-            out |= {case: [] for case in of}
+            out |= {case for case in fits if case.group == group}
     return out
 
 
