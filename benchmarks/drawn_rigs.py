@@ -26,21 +26,25 @@ LOOPS = 1000  # the first number whose spindles have loops of their own
 
 
 def main() -> None:
-    """Write them, with the example's DBC beside."""
+    """Write them, and print where."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("example", choices=[*EXAMPLES])
     parser.add_argument("folder", type=Path)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--count", type=int, default=10)
     asked = parser.parse_args()
-    source = EXAMPLES[asked.example]
-    asked.folder.mkdir(parents=True, exist_ok=True)
-    for dbc in source.parent.glob("*.dbc"):
-        shutil.copy(dbc, asked.folder)
     for number in range(asked.first, asked.first + asked.count):
-        name = f"{asked.example}{number}"
-        (asked.folder / f"{name}.toml").write_text(drawn(asked.example, number), encoding="utf-8")
-        print(asked.folder / f"{name}.toml")
+        print(write(asked.example, number, asked.folder))
+
+
+def write(example: str, number: int, folder: Path) -> Path:
+    """A rig file in a folder, with the example's DBC beside."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for dbc in EXAMPLES[example].parent.glob("*.dbc"):
+        shutil.copy(dbc, folder)
+    path = folder / f"{example}{number}.toml"
+    path.write_text(drawn(example, number), encoding="utf-8")
+    return path
 
 
 def drawn(example: str, number: int) -> Text:

@@ -9,15 +9,13 @@ import pytest
 from bench.cli.abilities import abilities
 from bench.rigfile import load_rig
 from bench.rigfile.check import check_rig
-from benchmarks.drawn_rigs import EXAMPLES, drawn
+from benchmarks.drawn_rigs import EXAMPLES, LOOPS, drawn, write
 
 
-@pytest.mark.parametrize("number", range(3))
+@pytest.mark.parametrize("number", [0, 1, 2, LOOPS])
 @pytest.mark.parametrize("example", EXAMPLES)
 def test_a_drawn_rig_is_a_rig(example: str, number: int, tmp_path: Path) -> None:
-    path, dbc = tmp_path / "drawn.toml", next(EXAMPLES[example].parent.glob("*.dbc"))
-    path.write_text(drawn(example, number), encoding="utf-8")
-    (tmp_path / dbc.name).write_bytes(dbc.read_bytes())
+    path = write(example, number, tmp_path)
     assert check_rig(str(path))[0] == ()
     assert "step" in {a.procedure for a in abilities(load_rig(str(path))) if a.able}
     assert drawn(example, number) == path.read_text(encoding="utf-8")

@@ -239,7 +239,7 @@ def of_results(
         if where in shared:
             coupled = [f"{q}@{c.where}" for c in results if c.group == where for q in (*OF_CASE, "settling_time")]
             coupled += [f"{q}@{where}" for q in (*OF_SIZES, *OF_GROUP)]
-            if leaning:  # of such a rig these quantities are optional
+            if leaning:  # as the rig is built: nothing is wrong with the run
                 yield Finding("axes-oblique", OBLIQUE, where, concerns=tuple(coupled))
             else:
                 yield Finding("gyroscopic", GYROSCOPIC, where, Effect.INDETERMINATE, tuple(coupled))

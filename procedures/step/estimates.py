@@ -15,11 +15,11 @@ from bench.uncertainty import Estimate, Influence
 from bench.uncertainty.estimate import Deviations
 from procedures.amb_rotor import loops
 from procedures.shared.certificates import certified
-from procedures.step import fit, response, settling
+from procedures.step import response, settling
 from procedures.step import steps as step_steps
 from procedures.step.acting import START_S
 from procedures.step.coupled import Tilting, hardly_swings
-from procedures.step.fit import swing
+from procedures.step.fit import shape, swing
 from procedures.step.likeness import astray
 from procedures.step.oscillation import One, Swing
 from procedures.step.position import leans, shares, tilting_of
@@ -144,10 +144,10 @@ def _curve(done: Sequence[Done], tilting: Tilting) -> Curve:
     search for two oscillations goes astray, with one of the position alone."""
     ones = [_one(d) for d in done]
     try:
-        found = fit.shape(ones, tilting=tilting)
+        found = shape(ones, tilting=tilting)
     except AnalysisError:
         try:
-            found = fit.shape([replace(o, both=o.both * ALONE) for o in ones])
+            found = shape([replace(o, both=o.both * ALONE) for o in ones])
         except AnalysisError:
             return settling.fit(done, np.zeros(0, complex))
     constant = max(found.constant, 0.0)

@@ -16,7 +16,7 @@ from procedures.step.oscillation import FROM_S, Array, One, Swing
 from procedures.step.steps import Case
 
 FIRST_S = 12e-3  # end of the first swings, whose top is the overshoot
-FEWEST = 4  # samples in the first swings, with which nothing is told
+FEWEST = 4  # samples in the first swings: fewer tell nothing
 UNLIKE = 4.0  # of mean squares over those of scatter: 1 in the mean
 
 

@@ -57,7 +57,7 @@ WAY = Quantity(
 )
 MEASURES = (OVERSHOOT, RISE, SETTLING, ERROR, BANDWIDTH, DAMPING, FREQUENCY, SIZE, WAY)
 SETTLED_S = 0.5  # after the last ramp of a speed
-COUPLED = (OVERSHOOT, SETTLING, BANDWIDTH, DAMPING, FREQUENCY, SIZE, WAY)  # untold where y and z share two oscillations
+MAY_LACK = (OVERSHOOT, SETTLING, BANDWIDTH, DAMPING, FREQUENCY, SIZE, WAY)
 MARGIN = 0.8  # of the clearance that a step with its overshoot may use
 
 
@@ -259,8 +259,7 @@ procedure = Procedure(
     name="step",
     title="Set-point steps of the levitated shaft",
     measures=MEASURES,
-    untold=lambda rig: COUPLED if leans(rig) else (),
-    optional=COUPLED,  # a finding names what is not told: what does not settle, or follow a fit; what does not swing is a note
+    optional=MAY_LACK,  # a finding names what is not told: what does not settle, or follow a fit; what does not swing is a note
     state=RigState.LEVITATED,
     plan=Plan,
     acquire=acquire,

@@ -28,9 +28,8 @@ BAND_S = 0.25, 0.5, 1.0  # of the response that makes the bandwidth: the first t
 CALM = 0.01  # of the step, over the last fifth of it
 SCANNED = 40  # the first line of the response that is looked at: 20 Hz, where the procedure begins
 PHASES = 3  # of the revolution, at which steps begin: what goes with one or two a turn has no mean
-ROUND = range(
-    1, 9
-)  # orders that small motions of a turning shaft are freed of: with two a pole damped by .73 was told .66
+# Orders that small motions of a turning shaft are freed of; with two a pole damped by .73 was told .66.
+ROUND = range(1, 9)
 COORDINATES = "yzx"
 
 
@@ -114,9 +113,7 @@ def steps(
     """Up, back, down and back, after `wait_s` and `rest_s`: by way (1 up, -1 down) what they show together; `turn_s` of a
     revolution, 0 at rest. Where the shaft turns, the mean of steps at PHASES of its revolution, since unbalance makes the
     bearings' slopes go with it."""
-    if (
-        turn_s
-    ):  # as it truly turns: a mean over a revolution that is 2e-4 too short keeps half a nanometre of an orbit of 2 µm
+    if turn_s:  # as it truly turns: a mean over 2e-4 of a revolution less keeps half a nanometre of an orbit of 2 µm
         turn_s = 2 * math.pi / plant.shaft_speed
     responses: dict[int, list[Array]] = {1: [], -1: []}
     errors: dict[int, list[float]] = {1: [], -1: []}

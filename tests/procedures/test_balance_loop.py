@@ -13,7 +13,7 @@ from bench.cli.virtual import simulated_run
 from bench.findings import Effect, Finding
 from bench.procedure import Measured
 from bench.uncertainty import interval
-from benchmarks.drawn_rigs import EXAMPLES, drawn
+from benchmarks import drawn_rigs
 from procedures.balance import apart, loop
 from procedures.balance.estimates import Result, readings
 from procedures.synchronous import runout
@@ -102,8 +102,6 @@ def test_parts_that_say_another_unbalance_are_told(inclined: tuple[Result, dict[
 def test_bearings_that_are_turned_to_each_other_make_no_parts_apart(tmp_path: Path) -> None:
     """What nobody knows of their stiffness moves the probes along y one way and those along z the other: by the uncertainty of
     the whole they were 3.0 apart on this sound spindle, 2.4 by that of their difference."""
-    path, dbc = tmp_path / "drawn.toml", next(EXAMPLES["spindle"].parent.glob("*.dbc"))
-    path.write_text(drawn("spindle", 17), encoding="utf-8")
-    (tmp_path / dbc.name).write_bytes(dbc.read_bytes())
+    path = drawn_rigs.write("spindle", 17, tmp_path)
     run = simulated_run("balance", str(path), 1, {}, tmp_path / "run.mcap")
     assert [f.code for f in run.results if isinstance(f, Finding) and f.effect is not Effect.NOTE] == []

@@ -9,14 +9,12 @@ from bench.cli.virtual import Simulated, simulated_run
 from bench.findings import Effect, Finding
 from bench.procedure import Measured
 from bench.uncertainty import interval
-from benchmarks.drawn_rigs import EXAMPLES, drawn
+from benchmarks import drawn_rigs
 
 
 def drawn_spindle(number: int, axis: str, seed: int, folder: Path) -> tuple[Simulated, dict[str, float]]:
     """Steps of it, and how far each result is off its truth, in U."""
-    path, dbc = folder / "drawn.toml", next(EXAMPLES["spindle"].parent.glob("*.dbc"))
-    path.write_text(drawn("spindle", number), encoding="utf-8")
-    (folder / dbc.name).write_bytes(dbc.read_bytes())
+    path = drawn_rigs.write("spindle", number, folder)
     run = simulated_run("step", str(path), seed, {"axes": [axis]}, folder / "run.mcap")
     true = truth_of_motion(run)
     told = {f"{m.quantity.name}@{m.where}": m.estimate for m in run.results if isinstance(m, Measured)}
