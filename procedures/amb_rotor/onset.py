@@ -17,6 +17,7 @@ the mean of each sample (n, 2); the position as a share of the way that the set 
 ONSET, BEFORE_S = 4, 0.03  # periods of the telemetry; s
 COARSE_S, FINE_S = 1e-4, 1e-5  # of the search
 LATE_S = 1.2e-5  # what a square of time leaves of the rotor's answer makes the start late, -20 to 30 us about this mean
+BESIDE_S, FREE = 3e-5, 4  # of a start, where the misfit is looked at; what is fitted: the start and three terms
 DELAY_TICKS = 2  # from the jump to the amplifiers: computed a tick late, applied one later
 
 
@@ -69,6 +70,24 @@ def unlike(
         return 0.0
     more = float((left[after] ** 2).mean() - left[~after].var(ddof=1))
     return math.sqrt(max(more, 0.0)) / abs(float(terms[1]))
+
+
+def noise_of(t: Array, current: Array, began: float, *, tick: float, ticks: int, lag_s: float, shaft: Shaft) -> float:
+    """How well the noise of the readings lets `onset` tell that start, s, a standard uncertainty: by how much the misfit grows
+    beside its least, where the motion of the shaft begins with the start."""
+    window = _window(tick, ticks, 0.0)
+    near = (t > began - BEFORE_S) & (t < began + window)
+    reads, i = t[near, None] - tick * np.arange(1, ticks + 1), current[near]
+
+    def left(t_0: float) -> float:
+        design = _answers(reads - t_0 - DELAY_TICKS * tick, lag_s, window, ())
+        design = _held(design, shaft(reads - (t_0 - began)))
+        terms, *_ = np.linalg.lstsq(design, i, rcond=None)
+        return float(((i - design @ terms) ** 2).sum())
+
+    least = left(began)
+    more = (left(began - BESIDE_S) + left(began + BESIDE_S)) / 2 - least
+    return BESIDE_S * math.sqrt(least / (len(i) - FREE) / more) if more > 0 else window
 
 
 def onset(

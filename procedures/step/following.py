@@ -8,11 +8,15 @@ looked at, 1.35 rises of a rotor of 60 g, its start was told 0.09 ms early.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 
 from procedures.amb_rotor.machine import AmbRotor
-from procedures.amb_rotor.onset import Shaft
+from procedures.amb_rotor.onset import ONSET, Shaft
 from procedures.step import response
 
 Array = npt.NDArray[np.float64]
@@ -20,6 +24,7 @@ Array = npt.NDArray[np.float64]
 # is older: a difference of two readings is that of their middle, and what keeps its noise down takes about a tick more. Without
 # noise the start is then 20 us late at most where a tick is a fifth of the telemetry's period or less (40 without that tick).
 HELD_TICKS, RATE_TICKS = 1.5, 1.5
+OLD_TICKS = (0.0, 3.0)  # a rate that is told at once, and one of a filter of two ticks: what a controller may do
 # Of how far the shaft goes: noise of a reading, beyond which its rate is told worse than a square of time stands for it. A loop
 # of 24 Hz goes a fifth of its step, of which its noise was 7 %, and its start was told 0.3 ms early; a spindle's is 0.4 %.
 NOISY, LAST = 0.015, 3  # samples that tell how far
@@ -31,26 +36,68 @@ def by_distance(machine: AmbRotor) -> bool:
     return not machine.can.flatness
 
 
-def is_told(t: Array, y: Array, before: float, until: float) -> bool:
-    """Whether readings `y` (n,) tell how the shaft moves from `before` until then: not one that hardly does, beside noise."""
-    rest, gone = y[t <= before], y[t <= until][-LAST:]
-    return len(rest) > LAST and bool(rest.std() < NOISY * gone.mean())
+class Push(NamedTuple):
+    """What of a step shows when its set point acted, on the time `t` (n,) s of its samples, between `earliest` and `latest`:
+    the `control` current (n,) A, each the mean of `ticks` readings `tick` s apart, which amplifiers lag by `lag_s`; the
+    position `y` (n,) as a share of the step, None where single readings were captured, of which `window_s` is looked at."""
+
+    t: Array
+    control: Array
+    y: Array | None
+    earliest: float
+    latest: float
+    tick: float
+    ticks: int
+    lag_s: float
+    window_s: float | None = None
 
 
-def motion(t: Array, y: Array, *, tick: float, lag_s: float) -> Shaft:
-    """Of a shaft whose readings `y` (n,), as shares of its step, are means over the period before `t` (n,)."""
-    fine, curve = response.curve(
-        t - tick / 2, y
-    )  # a reading stands for half a tick either way, and the last is one tick old
-    both = [_lagged(x, lag_s, float(fine[1] - fine[0])) for x in (curve, np.gradient(curve, fine))]
+class Motion(NamedTuple):
+    """Of a shaft as shares of its step `y` (n,), `since` (n,) s its start; the `noise` of one of these."""
 
-    def at(reads: Array) -> Array:
-        old = (HELD_TICKS, HELD_TICKS + RATE_TICKS)
-        return np.column_stack(
-            [np.interp(reads - k * tick, fine, x).mean(axis=1) for k, x in zip(old, both, strict=True)]
+    since: Array
+    y: Array
+    noise: float
+
+
+def motion(pushes: Sequence[Push], begans: Array, sizes: Sequence[float]) -> Motion:
+    """As steps of one axis show it together, of which each began at `begans` (n,) s on its own time and went `sizes` (n,) m
+    far: their mean by the square of the size, since their noise is the same."""
+    tick, period = pushes[0].tick, pushes[0].tick * pushes[0].ticks
+    since = np.arange(-ONSET, 2 * ONSET, 1 / response.FINE) * period
+    weights = np.square(sizes) / np.square(sizes).sum()
+    mean, noise = np.zeros(len(since)), 0.0
+    for p, began, weight in zip(pushes, begans, weights, strict=True):
+        assert p.y is not None
+        near = (p.t > began - 2 * ONSET * period) & (p.t < began + 3 * ONSET * period)
+        # a reading stands for half a tick either way, and the last is one tick old
+        fine, curve = response.curve(p.t[near] - tick / 2, p.y[near])
+        mean += weight * np.interp(began + since, fine, curve)
+        noise += weight**2 * float(p.y[p.t <= p.earliest].var())
+    return Motion(since, mean, math.sqrt(noise))
+
+
+def is_told(of: Motion, period_s: float) -> bool:
+    """Whether it shows how the shaft moves while the start is looked for: not one that hardly does, beside noise."""
+    gone = of.y[of.since < ONSET * period_s][-LAST * response.FINE :].mean()
+    return bool(of.noise < NOISY * gone)
+
+
+def shafts(of: Motion, pushes: Sequence[Push], begans: Array, rate_ticks: float = RATE_TICKS) -> list[Shaft]:
+    """The motion of each step, that began at `begans` (n,) s on its own time, as the amplifiers answer it; its rate so much
+    older than its position."""
+    first, apart = pushes[0], float(of.since[1] - of.since[0])
+    ages = [(HELD_TICKS + old) * first.tick for old in (0.0, rate_ticks)]
+    # before the start it rests: what is read then is noise, which would make the motion less than it is, and the start early
+    moves = [np.where(of.since < 0, 0.0, x) for x in (of.y, np.gradient(of.y, of.since))]
+    both = [_lagged(x, first.lag_s, apart) for x in moves]
+
+    def shaft(began: float) -> Shaft:
+        return lambda reads: np.column_stack(
+            [np.interp(reads - began - age, of.since, x).mean(axis=1) for age, x in zip(ages, both, strict=True)]
         )
 
-    return at
+    return [shaft(began) for began in begans]
 
 
 def _lagged(x: Array, lag_s: float, apart: float) -> Array:

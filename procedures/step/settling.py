@@ -108,7 +108,8 @@ def fit(
     does; `unlike`: it is that of two things together, of which one is faster.
 
     Each step is fitted alone, then its terms over size and beginning. Noise that swings is taken from what the fits leave,
-    over all times; what fades from the scatter of its terms, since a level's noise is slower than a record.
+    over all times, and from how well each start is known; what fades from the scatter of its terms, which has both, since a
+    level's noise is slower than a record.
 
     Raises:
         AnalysisError: too few steps to tell their scatter, or too few samples of one.
@@ -145,6 +146,8 @@ def fit(
     found[:FIRST, fading:] = np.linalg.lstsq(first, scaled[:, fading:], rcond=None)[0]
     apart = scaled[:, :fading] - fade @ found[: fade.shape[1], :fading]
     noise = _propagated(np.array(left) * weight[:, None], made)[fading:, fading:]
+    jitter = float(np.mean([(w * d.start_noise) ** 2 for w, d in zip(weight, steps, strict=True)]))
+    noise = noise + jitter * _shifted(found[0, fading:], poles)
     return Curve(
         poles, middle, fades, found, (apart.T @ apart / dof, noise), (_spread(fade), _spread(first)), dof, largest, last
     )
@@ -191,6 +194,15 @@ def _propagated(left: Array, made: Array) -> Array:
     correlation = np.fft.irfft(power)[:m] / (k * (m - made.shape[1]))
     inverse = np.linalg.pinv(made)
     return np.asarray(inverse @ linalg.matmul_toeplitz(correlation, inverse.T))
+
+
+def _shifted(terms: Array, poles: Complex) -> Array:
+    """Covariance (n, n) of terms (n,) that swing, over the variance of when they start, s²."""
+    many = 2 * len(poles)
+    later = (terms[:many:2] - 1j * terms[1:many:2]) * poles
+    moved = np.zeros(len(terms))
+    moved[:many:2], moved[1:many:2] = later.real, -later.imag
+    return np.outer(moved, moved)
 
 
 def settling(curve: Curve, case: Case, steps: Sequence[Done], band: float, seed: int = 0) -> Settling:

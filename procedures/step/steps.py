@@ -20,6 +20,7 @@ from procedures.amb_rotor.machine import AmbRotor
 from procedures.amb_rotor.onset import pushing
 from procedures.step import acting, capturing
 from procedures.step.acting import START_S, UNLIKE
+from procedures.step.following import Push, by_distance
 from procedures.step.held import asked_over_sent
 from procedures.step.position import ends_of, made_of, shares
 from procedures.step.requires import channels
@@ -63,7 +64,8 @@ class Done:
     `y` with it; `rest` m the same before the step; `control` A, difference of the coils, both bearings; `answered`: it did;
     `kicks` A, of each bearing's at first. `noise` m of the mean over `samples`. The `machine`.
     `apart` s from the first to the last write of the step's set points; how `unlike` to that of a jump the answer is;
-    `within` what of `t` the set points surely acted, s; they did `late_s` after t = 0, give or take `start_s`."""
+    `within` what of `t` the set points surely acted, s; they did `late_s` after t = 0, give or take `start_s`, and
+    `start_noise` (a standard uncertainty) of each by itself."""
 
     case: Case
     begin: float
@@ -91,6 +93,7 @@ class Done:
     within: tuple[float, float] = (0.0, 0.0)
     late_s: float = 0.0
     start_s: float = START_S
+    start_noise: float = 0.0
 
 
 def read_steps(recording: Recording[Any]) -> list[Done]:
@@ -99,11 +102,24 @@ def read_steps(recording: Recording[Any]) -> list[Done]:
     Raises:
         AnalysisError: there are none, or one holds too few samples.
     """
-    out = [_read(recording, step) for step in recording.steps(STEP)]
-    if not out:
+    read = [_read(recording, step) for step in recording.steps(STEP)]
+    if not read:
         raise AnalysisError("found no set-point steps; expected those of the plan (was the run stopped early?)")
-    groups = {group: iter(told(of)) for group, of in by_group(out).items()}
+    out = [done for done, _ in read]
+    groups = {
+        group: iter(told(_started(of, [p for d, p in read if d.case.group == group])))
+        for group, of in by_group(out).items()
+    }
     return [next(groups[done.case.group]) for done in out]
+
+
+def _started(steps: Sequence[Done], pushes: Sequence[Push]) -> list[Done]:
+    """Steps of one group, each counted from where its set point acted."""
+    found = acting.acted_together(pushes, [d.case.size for d in steps], by_distance=by_distance(steps[0].machine))
+    return [
+        replace(d, t=d.t - a.began, unlike=a.unlike, within=a.within, start_s=a.half, start_noise=a.noise)
+        for d, a in zip(steps, found, strict=True)
+    ]
 
 
 def by_case(steps: list[Done]) -> dict[Case, list[Done]]:
@@ -140,7 +156,8 @@ def told(steps: Sequence[Done]) -> list[Done]:
     ]
 
 
-def _read(recording: Recording[Any], step: Step) -> Done:
+def _read(recording: Recording[Any], step: Step) -> tuple[Done, Push]:
+    """With times from a tick and a half before those of its samples on, until it is known when the set point acted."""
     machine = conventions(recording.rig)
     data, labels = _whole(capturing.read(step, channels(recording.rig))), step.labels
     axis, signed = str(labels["axis"]), float(labels["step_m"])
@@ -153,7 +170,8 @@ def _read(recording: Recording[Any], step: Step) -> Done:
     if rest.sum() < 50 or (~rest).sum() < 100:
         raise AnalysisError(f"{case.where}: found {int(rest.sum())} samples before the step and {int((~rest).sum())} after; "
                             "expected at least 50 and 100")  # fmt: skip
-    return replace(_done(recording.rig, step, case, data, rest), apart=(written[-1] - written[0]) * 1e-9)
+    done, push = _done(recording.rig, step, case, data, rest)
+    return replace(done, apart=(written[-1] - written[0]) * 1e-9), push
 
 
 def _whole(data: dict[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
@@ -171,7 +189,7 @@ def _whole(data: dict[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
 
 def _done(
     rig: RigFile, step: Step, case: Case, data: Mapping[str, npt.NDArray[Any]], rest: npt.NDArray[np.bool_]
-) -> Done:
+) -> tuple[Done, Push]:
     axis, other, machine = case.axis, {"y": "z", "z": "y", "x": "y"}[case.axis], conventions(rig)
     # in steps as they were asked for, each of which is what was sent: overshoot, band and error are about that
     of_sent = asked_over_sent(rig, axis, float(step.labels["begin_m"]), case.way * case.size)
@@ -188,24 +206,25 @@ def _done(
     first, answered = acting.answer(clean[4:], rest, acting.before_it_moves(clean[0], rest))
     period = float(np.median(np.diff(t)))
     samples = 2 * math.pi / float(np.median(data[SPEED])) / period if turning else AT_REST_S / period
-    acted = acting.acted(
+    push = acting.pushed(
         rig, step, t, clean[3], clean[0] / case.size, first, origin_ns=int(data["t_ns"][0]), turning=turning
     )
-    since = t - acted.began - EARLY_TICKS * rig.devices["controller"].tick_s
+    since = t - EARLY_TICKS * rig.devices["controller"].tick_s
     keep = slice(max(first - 20, 0), None)
     quiet = clean[0][rest]
     slope = float(np.polyfit(t[rest], quiet, 1)[0])
     level = quiet - slope * (t[rest] - t[rest].mean())
     flags = data[STATUS].astype(np.int64)
-    return Done(
+    done = Done(
         case, float(step.labels["begin_m"]), since[keep], clean[0][keep], (case.way * (raw - raw[rest].mean()))[keep],
         clean[1][keep], clean[2][keep], clean[3][keep], quiet,
         float(trailing(level, samples)[round(samples) :].std()), samples, float(amplitude[0]), slope, answered,
         acting.kicks(clean[4:], case.way * np.array(ends), rest, first),
         (float(data[SPEED].min()), float(data[SPEED].max())), int(np.bitwise_or.reduce(flags)),
         tuple(c for c in (*machine.all_positions, *machine.all_currents) if np.ptp(data[c]) == 0), step.lost(), step.expected(),
-        machine, unlike=acted.unlike, within=acted.within,
+        machine,
     )  # fmt: skip
+    return done, push
 
 
 def _still(t: Array, signals: Array, angle: Array, rest: npt.NDArray[np.bool_]) -> tuple[Array, Array]:

@@ -13,7 +13,8 @@ from bench.rigfile.check_capabilities import problems_of
 from procedures.amb_rotor import loops
 from procedures.amb_rotor.onset import onset
 from procedures.step.acting import WINDOW_S
-from procedures.step.estimates import ALIAS, aliased, lag_estimate
+from procedures.step.estimates import ALIAS, aliased
+from procedures.step.influences import lag_estimate
 from procedures.step.rising import RISE_SHARE, spline_left
 from sim_backend.machines.twin.rules import drawn
 

@@ -17,7 +17,7 @@ from bench.errors import AnalysisError
 from bench.procedure import Measured
 from bench.uncertainty import interval
 from procedures.step import settling
-from procedures.step.estimates import settling_estimate
+from procedures.step.influences import settling_estimate
 from procedures.step.oscillation import shrinks
 from procedures.step.settling import Settling
 from procedures.step.steps import Case, Done
