@@ -10,7 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bench.errors import AnalysisError
 from bench.rigfile import RigFile, load_rig
+from benchmarks import drawn_rigs
 from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.frame import describe
 from procedures.step.position import leans, shares
@@ -52,6 +54,14 @@ def asked(
 
 
 Y = {"TargetLowerU": 1.0, "TargetUpperU": 1.0}
+
+
+def test_a_shaft_that_its_noise_alone_lifts_has_no_truth(tmp_path: Path) -> None:
+    """Bearings so weak that it hangs on a ring until noise shakes it off: taken for floating there, its steps were truly
+    nothing, and the run's results 120 to 3000 U off."""
+    rig = load_rig(str(drawn_rigs.write("spindle", 8, tmp_path)))
+    with pytest.raises(AnalysisError, match="does not lift without its noise"):
+        floating(rig, draw(rig, 5), {})
 
 
 def test_small_steps_swing_as_the_slowest_mode_of_the_linear_model() -> None:
