@@ -21,6 +21,7 @@ import numpy.typing as npt
 
 from bench.errors import AnalysisError
 from procedures.step.oscillation import shrinks
+from procedures.step.regressors import BOTH, FIRST, left_out, order_of, regressors, spread_of
 from procedures.step.steps import Case, Done
 
 Array = npt.NDArray[np.float64]
@@ -37,19 +38,15 @@ PER_SWING, DEAD = 100.0, 1e-4  # times looked at in a period, until the swing is
 # Times looked at in the shortest time constant from then on: between them a decay is taken for straight, which makes it cross
 # an edge late by its time constant over 8 PER_FADE² at most, 2 µs of 60 ms (5 ms apart it was 50 µs).
 PER_FADE = 60.0
-FIRST, SECOND, PLAIN = (
-    3,
-    5,
-    10.0,
-)  # regressors up to first and second order; variance ratio from which the latter are used
 END_S = 0.02  # before the record's end, within which nothing can be said to have settled
 
 
 @dataclass(frozen=True)
 class Curve:
-    """Fitted to steps (shares of each): `poles` 1/s, their `middle`, `fades` s, `terms` (SECOND, n) over the `_regressors` of a
+    """Fitted to steps (shares of each): `poles` 1/s, their `middle`, `fades` s, `terms` (SECOND, n) over the `regressors` of a
     step, its sizes over `largest` m. `covariances` of one of the largest steps, of what fades and what swings, with `dof`;
-    `spreads` (SECOND, SECOND) what a case's mean has of them. It says nothing after `until` s, the end of the shortest step."""
+    `spreads` (SECOND, SECOND) what a case's mean has of them. It says nothing after `until` s, the end of the shortest step.
+    `square`: of the sizes, over the largest's, in the mean of the steps, where the curve has nothing that goes with it."""
 
     poles: Complex
     middle: complex
@@ -60,6 +57,7 @@ class Curve:
     dof: int
     largest: float
     until: float
+    square: float | None = None
 
 
 @dataclass(frozen=True)
@@ -135,9 +133,10 @@ def fit(
         terms.append(np.linalg.lstsq(made, y, rcond=None)[0])
         left.append(y - made @ terms[-1])
     scaled, fading = np.array(terms) * weight[:, None], 1 + len(fades)
-    full = np.array([_regressors(d.case, d.begin, largest) for d in steps]) * weight[:, None]
+    full = np.array([regressors(d.case, d.begin, largest) for d in steps]) * weight[:, None]
     first = full[:, :FIRST]
-    fade = full[:, : _order(full, scaled[:, :fading] @ made[:, :fading].T)]
+    fade = full[:, : order_of(full, scaled[:, :fading] @ made[:, :fading].T)]
+    square = float(np.average(full[:, 0] ** 2, weights=full[:, 0] ** 2)) if fade.shape[1] == FIRST else None
     dof = len(steps) - int(np.linalg.matrix_rank(fade))
     if dof < 2:
         raise AnalysisError(f"{steps[0].case.group}: found {len(steps)} steps; expected at least {FIRST + 2}")
@@ -149,7 +148,16 @@ def fit(
     jitter = float(np.mean([(w * d.start_noise) ** 2 for w, d in zip(weight, steps, strict=True)]))
     noise = noise + jitter * _shifted(found[0, fading:], poles)
     return Curve(
-        poles, middle, fades, found, (apart.T @ apart / dof, noise), (_spread(fade), _spread(first)), dof, largest, last
+        poles,
+        middle,
+        fades,
+        found,
+        (apart.T @ apart / dof, noise),
+        (spread_of(fade), spread_of(first)),
+        dof,
+        largest,
+        last,
+        square,
     )
 
 
@@ -157,32 +165,6 @@ def _faster(constant: float) -> tuple[float, ...]:
     """Time constants before the usual ones: the one that was found, and others by about the same ratio until these; rising."""
     many = math.ceil(math.log(FADES_S / constant) / math.log(APART) - 0.3) if 0 < constant < FADES_S else 0
     return tuple(float(c) for c in np.geomspace(constant, FADES_S, many + 1)[:-1]) if many > 0 else ()
-
-
-def _spread(design: Array) -> Array:
-    """Variance of the design's coefficients (k, k) in units of a largest step's; zeros for columns that are not used."""
-    out = np.zeros((SECOND, SECOND))
-    used = design.shape[1]
-    out[:used, :used] = np.linalg.pinv(design.T @ design)
-    return out
-
-
-def _regressors(case: Case, begin: float, largest: float) -> tuple[float, ...]:
-    """1, the signed size, where the step began beside the mean of those of its size and way; then second order."""
-    size = case.way * case.size / largest
-    began = begin / largest + size / 2
-    return 1.0, size, began, size**2, size * began
-
-
-def _order(design: Array, faded: Array) -> int:
-    """How many columns of the design: all where the second order is plain in what fades (k, m), as with an integrator that
-    carries a third of the step; else those of first order, which leave the smallest steps far more certain."""
-    rest = []
-    for many in (FIRST, design.shape[1]):
-        used = design[:, :many]
-        rest.append(float(((faded - used @ np.linalg.lstsq(used, faded, rcond=None)[0]) ** 2).sum()))
-    more, dof = design.shape[1] - FIRST, len(design) - design.shape[1]
-    return design.shape[1] if dof >= more and (rest[0] - rest[1]) / more > PLAIN * rest[1] / dof else FIRST
 
 
 def _propagated(left: Array, made: Array) -> Array:
@@ -214,11 +196,13 @@ def settling(curve: Curve, case: Case, steps: Sequence[Done], band: float, seed:
     within = max(band, BAND_NOISE * noise)
     t = _looked_at(curve, curve.until)
     made = columns(t, curve.poles, curve.middle, curve.fades, window)
-    of = np.array(_regressors(case, -case.way * case.size / 2, curve.largest))
+    of = np.array(regressors(case, -case.way * case.size / 2, curve.largest))
     off = made @ (of @ curve.terms) - 1
     parts = (c * float(of @ s @ of) for c, s in zip(curve.covariances, curve.spreads, strict=True))
     values, vectors = np.linalg.eigh(linalg.block_diag(*parts))
     shapes = made @ (vectors * np.sqrt(np.maximum(values, 0.0)))
+    if curve.square is not None:
+        shapes = np.column_stack([shapes, made @ curve.terms[BOTH] * left_out(case, curve.largest, curve.square)])
     beyond, reach = np.abs(off) - within, NEAR * np.sqrt((shapes**2).sum(axis=1))
     touching = _touching(beyond, reach)
     best = float(crossings(t, off[None, :], within)[0])
@@ -227,7 +211,7 @@ def settling(curve: Curve, case: Case, steps: Sequence[Done], band: float, seed:
     if not len(touching):
         return Settling(FROM_S / 2, within, np.linspace(0, FROM_S, DRAWS))
     rng = np.random.default_rng(seed)
-    drawn = rng.standard_normal((DRAWS, len(values))) * np.sqrt(curve.dof / rng.chisquare(curve.dof, (DRAWS, 1)))
+    drawn = rng.standard_normal((DRAWS, shapes.shape[1])) * np.sqrt(curve.dof / rng.chisquare(curve.dof, (DRAWS, 1)))
     ended = np.concatenate([crossings(t, off + few @ shapes.T, within) for few in np.array_split(drawn, PARTS)])
     times = _possible(t, off, ended, touching)
     return Settling(float(times.mean()), within, times)
