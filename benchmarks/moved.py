@@ -137,7 +137,9 @@ def attempt(procedure: str, rig: str, seed: int, truth: Mapping[str, float], fol
 def _quick(procedure: str, rig: str) -> dict[str, Any]:
     """The short plan; a twin has speeds and captures of its own."""
     return {
-        k: v for k, v in QUICK.get(procedure, {}).items() if rig not in TWINS or k not in ("speeds_rad_s", "capture_s")
+        k: v
+        for k, v in QUICK.get(procedure, {}).items()
+        if rig not in TWINS or k not in ("speed_rad_s", "speeds_rad_s", "capture_s")
     }
 
 

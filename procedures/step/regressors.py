@@ -43,9 +43,14 @@ def spread_of(design: Array) -> Array:
     return out
 
 
-def left_out(case: Case, largest: float, square: float) -> float:
-    """Standard uncertainty of what goes with the square of the size, over what steps away from the middle have beside those
-    back, where the curve has only the latter; `square` of the sizes in its mean. A stiffness that is another one where a step
-    ends goes with (m + s/2)² there, m its middle and s its size; of that m s is what steps away have, twice as much as s²/4 and
-    the m² = s²/4 of steps from and to the same place have of the square: half of it at most, one way or the other."""
+def left_out(seen: Array, variance: Array) -> Array:
+    """What steps away have beside those back (n,), as far as it is more than its noise of `variance` (n,)."""
+    return np.asarray(np.sign(seen) * np.sqrt(np.maximum(seen**2 - variance, 0.0)))
+
+
+def beside(case: Case, largest: float, square: float) -> float:
+    """Standard uncertainty of what goes with the square of the size, over that, where the curve has not the square; `square` of
+    the sizes in its mean. A stiffness that is another one where a step ends goes with (m + s/2)² there, m its middle and s its
+    size; of that m s is what steps away have, twice as much as s²/4 and the m² = s²/4 of steps from and to the same place have
+    of the square: half of it at most, one way or the other."""
     return 0.5 / math.sqrt(3) * abs((case.size / largest) ** 2 - square)

@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from bench.errors import AnalysisError
 from procedures.step.oscillation import shrinks
-from procedures.step.regressors import BOTH, FIRST, left_out, order_of, regressors, spread_of
+from procedures.step.regressors import BOTH, FIRST, beside, left_out, order_of, regressors, spread_of
 from procedures.step.steps import Case, Done
 
 Array = npt.NDArray[np.float64]
@@ -202,7 +202,9 @@ def settling(curve: Curve, case: Case, steps: Sequence[Done], band: float, seed:
     values, vectors = np.linalg.eigh(linalg.block_diag(*parts))
     shapes = made @ (vectors * np.sqrt(np.maximum(values, 0.0)))
     if curve.square is not None:
-        shapes = np.column_stack([shapes, made @ curve.terms[BOTH] * left_out(case, curve.largest, curve.square)])
+        told = linalg.block_diag(*(c * s[BOTH, BOTH] for c, s in zip(curve.covariances, curve.spreads, strict=True)))
+        more = left_out(made @ curve.terms[BOTH], np.einsum("ij,jk,ik->i", made, told, made))
+        shapes = np.column_stack([shapes, more * beside(case, curve.largest, curve.square)])
     beyond, reach = np.abs(off) - within, NEAR * np.sqrt((shapes**2).sum(axis=1))
     touching = _touching(beyond, reach)
     best = float(crossings(t, off[None, :], within)[0])
