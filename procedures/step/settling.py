@@ -12,7 +12,7 @@ the set point where it began (bearings are not linear).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -38,6 +38,7 @@ PER_SWING, DEAD = 100.0, 1e-4  # times looked at in a period, until the swing is
 # Times looked at in the shortest time constant from then on: between them a decay is taken for straight, which makes it cross
 # an edge late by its time constant over 8 PER_FADE² at most, 2 µs of 60 ms (5 ms apart it was 50 µs).
 PER_FADE = 60.0
+LATER_S = 1e-5  # by which a start is moved to see what it does
 END_S = 0.02  # before the record's end, within which nothing can be said to have settled
 
 
@@ -46,7 +47,8 @@ class Curve:
     """Fitted to steps (shares of each): `poles` 1/s, their `middle`, `fades` s, `terms` (SECOND, n) over the `regressors` of a
     step, its sizes over `largest` m. `covariances` of one of the largest steps, of what fades and what swings, with `dof`;
     `spreads` (SECOND, SECOND) what a case's mean has of them. It says nothing after `until` s, the end of the shortest step.
-    `square`: of the sizes, over the largest's, in the mean of the steps, where the curve has nothing that goes with it."""
+    `square`: of the sizes, over the largest's, in the mean of the steps, where the curve has nothing that goes with it;
+    `jitter` s of a largest step's start, by noise."""
 
     poles: Complex
     middle: complex
@@ -58,6 +60,7 @@ class Curve:
     largest: float
     until: float
     square: float | None = None
+    jitter: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -145,8 +148,7 @@ def fit(
     found[:FIRST, fading:] = np.linalg.lstsq(first, scaled[:, fading:], rcond=None)[0]
     apart = scaled[:, :fading] - fade @ found[: fade.shape[1], :fading]
     noise = _propagated(np.array(left) * weight[:, None], made)[fading:, fading:]
-    jitter = float(np.mean([(w * d.start_noise) ** 2 for w, d in zip(weight, steps, strict=True)]))
-    noise = noise + jitter * _shifted(found[0, fading:], poles)
+    jitter = math.sqrt(float(np.mean([(w * d.start_noise) ** 2 for w, d in zip(weight, steps, strict=True)])))
     return Curve(
         poles,
         middle,
@@ -158,6 +160,7 @@ def fit(
         largest,
         last,
         square,
+        jitter,
     )
 
 
@@ -178,15 +181,6 @@ def _propagated(left: Array, made: Array) -> Array:
     return np.asarray(inverse @ linalg.matmul_toeplitz(correlation, inverse.T))
 
 
-def _shifted(terms: Array, poles: Complex) -> Array:
-    """Covariance (n, n) of terms (n,) that swing, over the variance of when they start, s²."""
-    many = 2 * len(poles)
-    later = (terms[:many:2] - 1j * terms[1:many:2]) * poles
-    moved = np.zeros(len(terms))
-    moved[:many:2], moved[1:many:2] = later.real, -later.imag
-    return np.outer(moved, moved)
-
-
 def settling(curve: Curve, case: Case, steps: Sequence[Done], band: float, seed: int = 0) -> Settling:
     """Of the mean of a case's steps, averaged as its noise is, into the band; five times that noise at least."""
     from scipy import linalg
@@ -200,11 +194,9 @@ def settling(curve: Curve, case: Case, steps: Sequence[Done], band: float, seed:
     off = made @ (of @ curve.terms) - 1
     parts = (c * float(of @ s @ of) for c, s in zip(curve.covariances, curve.spreads, strict=True))
     values, vectors = np.linalg.eigh(linalg.block_diag(*parts))
-    shapes = made @ (vectors * np.sqrt(np.maximum(values, 0.0)))
-    if curve.square is not None:
-        told = linalg.block_diag(*(c * s[BOTH, BOTH] for c, s in zip(curve.covariances, curve.spreads, strict=True)))
-        more = left_out(made @ curve.terms[BOTH], np.einsum("ij,jk,ik->i", made, told, made))
-        shapes = np.column_stack([shapes, more * beside(case, curve.largest, curve.square)])
+    shapes = np.column_stack(
+        [made @ (vectors * np.sqrt(np.maximum(values, 0.0))), *_known_otherwise(curve, case, t, window, made)]
+    )
     beyond, reach = np.abs(off) - within, NEAR * np.sqrt((shapes**2).sum(axis=1))
     touching = _touching(beyond, reach)
     best = float(crossings(t, off[None, :], within)[0])
@@ -213,10 +205,26 @@ def settling(curve: Curve, case: Case, steps: Sequence[Done], band: float, seed:
     if not len(touching):
         return Settling(FROM_S / 2, within, np.linspace(0, FROM_S, DRAWS))
     rng = np.random.default_rng(seed)
-    drawn = rng.standard_normal((DRAWS, shapes.shape[1])) * np.sqrt(curve.dof / rng.chisquare(curve.dof, (DRAWS, 1)))
+    drawn = rng.standard_normal((DRAWS, shapes.shape[1]))
+    drawn[:, : len(values)] *= np.sqrt(curve.dof / rng.chisquare(curve.dof, (DRAWS, 1)))
     ended = np.concatenate([crossings(t, off + few @ shapes.T, within) for few in np.array_split(drawn, PARTS)])
     times = _possible(t, off, ended, touching)
     return Settling(float(times.mean()), within, times)
+
+
+def _known_otherwise(curve: Curve, case: Case, t: Array, window: float, made: Array) -> Iterator[Array]:
+    """What else the curve of a case's mean may be off by, at `t` (n,): where each step's swing begins (what fades scatters with
+    it), and the square of the size."""
+    from scipy import linalg
+
+    of, fading = regressors(case, -case.way * case.size / 2, curve.largest), 1 + len(curve.fades)
+    later, sooner = (columns(t + by, curve.poles, curve.middle, curve.fades, window) for by in (LATER_S, -LATER_S))
+    rate = (later - sooner)[:, fading:] @ (np.array(of) @ curve.terms)[fading:] / (2 * LATER_S)
+    yield rate * curve.jitter * math.sqrt(float(np.array(of) @ curve.spreads[1] @ np.array(of)))
+    if curve.square is not None:
+        told = linalg.block_diag(*(c * s[BOTH, BOTH] for c, s in zip(curve.covariances, curve.spreads, strict=True)))
+        more = left_out(made @ curve.terms[BOTH], np.einsum("ij,jk,ik->i", made, told, made))
+        yield more * beside(case, curve.largest, curve.square)
 
 
 def _looked_at(curve: Curve, last: float) -> Array:

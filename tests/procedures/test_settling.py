@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -113,6 +114,37 @@ def test_a_tail_along_the_bands_edge_is_told_where_it_crosses_and_left_open_wher
     never = settled(made(0.6, level=0.03))
     assert math.isinf(never.time)
     assert not never.open
+
+
+def told(steps: list[Done], size: float, constant: float = 0.06) -> Settling:
+    """Of steps up, of that size, whose slow part has one constant."""
+    case = Case("A", 0.0, "y", size, 1)
+    curve = settling.fit(steps, np.array([POLE * 1.003, POLE * 0.997]), POLE, constant)
+    return settling.settling(curve, case, [d for d in steps if d.case == case], 0.02)
+
+
+def test_what_steps_away_have_beside_those_back_is_no_scatter() -> None:
+    """1 % of what fades in the largest steps, more away and less back. It is none of a case's mean, and made its time uncertain
+    by four times what noise does. The square of the size may have as much, one way or the other, which data of two sizes
+    hardly tell: 0.5/√3 of twice that 1 %, at 10 um, times the distance of 0.25 from the mean square 0.85."""
+    steps, fade = made(0.6, tail=0.22, constant=0.06, noise=1e-9), 0.22 * np.exp(-made(0.6)[0].t / 0.06)
+    shares = [0.01 * (1 if d.begin == 0 else -1) * (d.case.size / max(SIZES)) ** 2 for d in steps]
+    apart = [
+        replace(d, y=np.where(d.t > 0, d.y + share * fade * d.case.size, d.y))
+        for d, share in zip(steps, shares, strict=True)
+    ]
+    assert told(apart, 20e-6).times.std() == pytest.approx(
+        math.hypot(told(steps, 20e-6).times.std(), 0.15 / 0.6 * 0.208e-3), rel=0.05
+    )
+    assert told(apart, 10e-6).times.std() == pytest.approx(0.5 / math.sqrt(3) * 0.02 * 0.6 * 0.06, rel=0.05)
+
+
+def test_a_start_that_is_not_known_moves_what_swings() -> None:
+    """Each of the largest by 0.1 ms and the others by 0.2 ms: a case's time by √0.129 and √0.218 of 0.1 ms."""
+    swing = touching(0.026)
+    steps = [replace(d, start_noise=1e-4 * max(SIZES) / d.case.size) for d in made(swing, noise=1e-9)]
+    for size, share in zip(SIZES, (0.129, 0.218), strict=True):
+        assert settled(steps, size).times.std() == pytest.approx(1e-4 * math.sqrt(share), rel=0.06)
 
 
 @pytest.mark.parametrize("tail", [0.22, 0.225, 0.23, 0.235])
