@@ -117,7 +117,7 @@ def fit(
     """
     last = min(float(d.t[-1]) for d in steps)
     fades = tuple(float(f) for f in FADES_S * APART ** np.arange(FADES) if f <= last)
-    fades = (*_faster(constant / APART**2 if unlike else constant), *fades)
+    fades = (*_faster(constant / APART**2 if unlike else constant, poles), *fades)
     fades = fades if len(poles) else (*HARD_S, *fades)
     poles = lasting(poles)
     middle = middle if middle is not None else complex(poles.mean()) if len(poles) else 0j
@@ -164,8 +164,14 @@ def fit(
     )
 
 
-def _faster(constant: float) -> tuple[float, ...]:
-    """Time constants before the usual ones: the one that was found, and others by about the same ratio until these; rising."""
+def _faster(constant: float, poles: Complex) -> tuple[float, ...]:
+    """Time constants before the usual ones: from the one that was found on, others by about the same ratio until these; rising.
+    One that is hardly slower than the usual ones may be that of two. Where none is found and the swing is over by then, from
+    half of the first on: slow integrators leave what lasts 70 ms, and their settling was told .9 ms early."""
+    if FADES_S <= constant < FADES_S * APART**2:
+        constant /= APART**2
+    elif not constant and len(poles) and math.exp(float(poles.real.max()) * FADES_S / 2) < DEAD:
+        constant = FADES_S / 2
     many = math.ceil(math.log(FADES_S / constant) / math.log(APART) - 0.3) if 0 < constant < FADES_S else 0
     return tuple(float(c) for c in np.geomspace(constant, FADES_S, many + 1)[:-1]) if many > 0 else ()
 

@@ -157,6 +157,26 @@ def test_what_fades_fast_crosses_the_bands_edge_when_it_does(tail: float) -> Non
     assert found.time == pytest.approx(true_time(0.6, tail=tail, constant=0.06), abs=4e-6)
 
 
+@pytest.mark.parametrize(
+    ("poles", "constant", "first"),
+    [
+        ((POLE, POLE), 0.0, 0.1),
+        ((-567 + 985j, -414 + 0j), 0.0, 0.05),
+        ((POLE, POLE), 0.06, 0.06),
+        ((POLE, POLE), 0.128, 0.05),
+        ((POLE, POLE), 0.3, 0.1),
+    ],
+)
+def test_decays_begin_where_something_may_fade(poles: tuple[complex, complex], constant: float, first: float) -> None:
+    """From 0.1 s, from the one that was found, from what two that look like one of 0.128 s may be, and from half of the first
+    where no swing can be taken for it."""
+    curve = settling.fit(made(0.6), np.array(poles), None, constant)
+    assert curve.fades[0] == pytest.approx(first, rel=1e-3)
+    ratios = np.divide(curve.fades[1:], curve.fades[:-1])
+    assert (ratios > 1.35).all()
+    assert (ratios < 2.05).all()
+
+
 def test_nothing_is_told_beyond_the_shortest_record() -> None:
     """Records of a live run end when its computer comes round to it. A curve says nothing where it was not fitted to all."""
     short, long = (made(0.6, tail=0.02, constant=0.3, record=record, seed=5) for record in (1.0, 3.0))
