@@ -25,8 +25,9 @@ Array = npt.NDArray[np.float64]
 # noise the start is then 20 us late at most where a tick is a fifth of the telemetry's period or less (40 without that tick).
 HELD_TICKS, RATE_TICKS = 1.5, 1.5
 OLD_TICKS = (0.0, 3.0)  # a rate that is told at once, and one of a filter of two ticks: what a controller may do
-# Of how far the shaft goes: noise of a reading, beyond which its rate is told worse than a square of time stands for it. A loop
-# of 24 Hz goes a fifth of its step, of which its noise was 7 %, and its start was told 0.3 ms early; a spindle's is 0.4 %.
+# Of how far the shaft goes: noise of the steps' mean, beyond which its rate is told worse than a square of time stands for it.
+# A loop of 24 Hz goes a fifth of its step, of which a step's noise was 7 %, and its start was told 0.3 ms early; a spindle's is
+# 0.4 %.
 NOISY, LAST = 0.015, 3  # samples that tell how far
 
 
