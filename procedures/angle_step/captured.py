@@ -30,8 +30,9 @@ from procedures.servomotor.conventions import conventions
 from procedures.shared.certificates import certified_gain
 
 Array = npt.NDArray[np.float64]
-TICKS = 0.1  # of a tick: a crossing, where steps that are alike meet the same ticks
-BETWEEN = 0.004  # of a count: what turning points are off in all steps alike, both ways (at 2 degrees; further on none is seen)
+TICKS = 0.03  # of a tick: a crossing, where steps that are alike meet the same ticks
+EARLY = 0.01  # of a count: where the angle passes 10 %, with few edges before, in all steps alike
+BETWEEN = 0.09  # of a count, over the counts of the step: what turning points are off in all steps alike, both ways
 
 
 def by_case(
@@ -64,8 +65,9 @@ def _estimates(
 ) -> dict[str, Estimate]:  # fmt: skip
     where, swings = case.where, [d.swing for d in done if d.swing is not None]
     tick = float(swings[0].t[1])
+    same = alike(case.size, count)
     between = _read(f"edges/{where}", "encoder between its counts",
-                    max(f.course.unsure(BETWEEN, count) for f in found), "rad")  # fmt: skip
+                    max(f.course.unsure(same, count) for f in found), "rad")  # fmt: skip
     crossings = _read(f"ticks/{where}", "sampling", tick * TICKS / math.sqrt(2), "s")
     tops = _ways(found, [f.overshoot for f in found])
     starts = _ways(found, [f.began.edge for f in found])
@@ -78,10 +80,11 @@ def _estimates(
     rises = _ways(found, [f.rise for f in found])
     out = {
         "rise_time": _repeated(f"rise_time/{where}", "s", rises, *noise(rises, starts, longer))
-        + crossings * math.sqrt(2) + _in(loose * longer, "s"),
+        + crossings * math.sqrt(2) + _in(loose * longer, "s")
+        + _read(f"edges/rise/{where}", "encoder between its counts", EARLY * abs(longer), "s"),
         "overshoot": _repeated(f"overshoot/{where}", "1", tops, top, dof)
         + between * (1 / case.size) + _in(loose * higher, "1"),
-        "settling_time": _settling(where, found, (top * case.size, dof), count) + crossings,
+        "settling_time": _settling(where, found, (top * case.size, dof), same, count) + crossings,
         "final_error": _final(where, found, done, count, kp),
         **_peaks(where, found, done, rig),
         **bounds.estimates(where, swings, rig, case.allocation == "priority"),
@@ -91,6 +94,11 @@ def _estimates(
     if len(cut) == len(found):
         out["saturated"] = _cut(where, _ways(found, cut), tick)
     return out
+
+
+def alike(size: float, count: float) -> float:
+    """What turning points are off in all steps alike, counts: the more edges a step passes, the less is left between them."""
+    return BETWEEN * count / size
 
 
 def _cut(where: str, ways: Sequence[Sequence[float]], tick: float) -> Estimate:
@@ -117,10 +125,12 @@ def _in(estimate: Estimate, unit: str) -> Estimate:
     return Estimate(estimate.value, unit, estimate.sensitivities)
 
 
-def _settling(where: str, found: Sequence[Fine], top: tuple[float, int], count: float) -> Estimate:
+def _settling(
+    where: str, found: Sequence[Fine], top: tuple[float, int], same: float, count: float
+) -> Estimate:  # fmt: skip
     """The mean over the steps; `top`: what noise does to a turning point as it is read, rad, and the degrees of freedom by
-    which it may be more."""
-    return settled(where, [f.settled for f in found], (max(top[0], EACH * count), top[1]), BETWEEN, count)
+    which it may be more; `same`: what turning points of all steps are off, counts."""
+    return settled(where, [f.settled for f in found], (max(top[0], EACH * count), top[1]), same, count)
 
 
 def _final(where: str, found: Sequence[Fine], done: Sequence[Done], count: float, kp: float) -> Estimate:

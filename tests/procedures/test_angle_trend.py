@@ -9,7 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from procedures.angle_step.captured import _loose, _settling
+from procedures.angle_step.captured import _loose, _settling, alike
 from procedures.angle_step.course import Course
 from procedures.angle_step.fine import Fine
 from procedures.angle_step.response import Move
@@ -94,7 +94,7 @@ def swings(heights: list[float], began: Began = SURE, band: float = 2.0) -> list
 
 def told(heights: list[float], noise: float, dof: int = 10, began: Began = SURE) -> tuple[float, float]:
     """Value and standard uncertainty of settling, s, where noise moves a turning point by so many counts."""
-    found = _settling("here", swings(heights, began), (noise * COUNT, dof), COUNT)
+    found = _settling("here", swings(heights, began), (noise * COUNT, dof), alike(22.8 * COUNT, COUNT), COUNT)
     return found.value, found.u
 
 
@@ -120,6 +120,12 @@ def test_noise_that_few_steps_tell_may_be_more() -> None:
     """A swing 0.03 of a count within the band: one of forty left it, where three degrees of freedom told 0.003 of a count."""
     assert told([1.97] * 10, 0.003, 3)[1] > 2e-4
     assert told([1.97] * 10, 0.003, 1000)[1] < 1e-4
+
+
+@pytest.mark.parametrize(("degrees", "counts"), [(2, 0.00396), (5, 0.00158), (12, 0.00066)])
+def test_turning_points_of_a_larger_step_have_more_edges(degrees: float, counts: float) -> None:
+    """0.09 of a count over the counts of the step, of which 4096 are a turn: by hand."""
+    assert alike(math.radians(degrees), COUNT) == pytest.approx(counts, rel=0.01)
 
 
 @pytest.mark.parametrize(("loose", "least"), [(False, 0.0), (True, 0.05)])

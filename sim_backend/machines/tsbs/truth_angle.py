@@ -167,7 +167,7 @@ class _Carried:
         angles = []
         for _ in range(round(seconds / 0.01)):
             self.plant.run(round(0.01 / TICK_S))
-            angles.append(self.plant.state()["s"][5] + self.p.encoder_offset)
+            angles.append(self.plant.shaft()[5] + self.p.encoder_offset)
         return float(np.mean(angles))
 
     def _recorded(self, seconds: float) -> _Seen:
@@ -175,10 +175,10 @@ class _Carried:
         derivative of the encoder's counts kicks it by, which a spline of its places alone would round off."""
         from scipy import interpolate
 
-        states, trace = [self.plant.state()["s"]], []
+        states, trace = [self.plant.shaft()], []
         for _ in range(round(seconds / TICK_S / PERIOD_TICKS)):
             _, ticks = self.plant.run(PERIOD_TICKS, 1)
-            states.append(self.plant.state()["s"])
+            states.append(self.plant.shaft())
             trace.append(ticks)
         whole = np.arange(len(states)) * PERIOD_TICKS
         places, speeds = np.array(states)[:, :6], np.array(states)[:, 6:12] * TICK_S
