@@ -22,7 +22,7 @@ from procedures.servomotor.conventions import Servomotor
 from procedures.shared import signals
 
 ALL = 0.999  # of the samples of a capture, in which the law gives all that there is
-SAME = 2e-3  # relative: the bound told is computed in single precision from what is captured beside it
+SAME = 1e-4  # of the limit: the bound told is computed in single precision from what is captured beside it, 2e-7 A off
 SAME_A = 0.01  # torque current by the sensors and by the law: the amplifiers close on these sensors
 SAME_SHARE = 5e-3  # of lambda
 LATE_RAD = 0.02  # of the commutation: compensated, 1e-3 is left; not compensated, 0.05 at 30 rad/s

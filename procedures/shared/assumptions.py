@@ -135,6 +135,11 @@ BALANCE = (
 )
 LOAD_BALANCING = (
     "Segment current sensors whose readings bend: 0.1 % of 10 A at 7 A and nothing at 5 A changes the reduction by 0.1 points.",
+    "A segment's current sensor whose gain has changed since its certificate: the segment gives another force for what it "
+    "reads, as segments do that differ. 1 % of one of four is 0.5 % of the peaks, 0.002 of unbalance after balancing and "
+    "0.004 of its ratio; the reduction stays.",
+    "A position sensor whose gain has changed since the calibrations: 1 % of it is up to 10 nm of error_radius before "
+    "balancing and 0.2 nm after, and no current. 10 % is found.",
 )
 MISSION = (
     "Readings are not the shaft's axis: integrators bring each reading back to zero, and a target that is not round moves the "
