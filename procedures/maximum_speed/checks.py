@@ -104,7 +104,7 @@ def _bounds(windows: Sequence[Window], limit_A: float) -> Iterator[Finding]:
     if abs(off.told.told_bound - off.told.bound) > SAME * limit_A:
         yield Finding(
             "bound-differs",
-            f"the law's bound is {off.told.told_bound:.3f} A where {limit_A:g} A leave {off.told.bound:.3f} A beside i_x and "
+            f"the law's bound is {off.told.told_bound:.4f} A where {limit_A:g} A leave {off.told.bound:.4f} A beside i_x and "
             "i_y: it has another limit, or computes another bound.", off.where, Effect.INDETERMINATE,
         )  # fmt: skip
     most = max(windows, key=lambda w: w.told.largest)

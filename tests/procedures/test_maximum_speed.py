@@ -185,7 +185,7 @@ def test_a_raised_rotor_runs_on_the_machine_of_the_thesis(tmp_path: Path) -> Non
     ("defect", "code", "says"),
     [
         ({"kept_allocation": 2.0}, "sharing-not-switched", "lambda is 0.500"),
-        ({"factor_segment_max": 1.03}, "bound-differs", "another limit"),
+        ({"factor_segment_max": 1.001}, "bound-differs", "another limit"),
         ({"factor_lag_compensation": 0.0}, "commutation-late", "behind the field"),
         ({"exchange_segments": 1.0}, "segments-exchanged", "exchanged"),
         ({"viscous": 1.06 * 0.2813}, "speed-contradicts", "B, T_c or alpha_tau"),
