@@ -33,6 +33,7 @@ Array = npt.NDArray[np.float64]
 TICKS = 0.03  # of a tick: a crossing, where steps that are alike meet the same ticks
 EARLY = 0.01  # of a count: where the angle passes 10 %, with few edges before, in all steps alike
 BETWEEN = 0.09  # of a count, over the counts of the step: what turning points are off in all steps alike, both ways
+TOPS = 0.002  # of a count: and what the ticks of their edges make of them, which are the same ones each time
 
 
 def by_case(
@@ -98,7 +99,7 @@ def _estimates(
 
 def alike(size: float, count: float) -> float:
     """What turning points are off in all steps alike, counts: the more edges a step passes, the less is left between them."""
-    return BETWEEN * count / size
+    return math.hypot(BETWEEN * count / size, TOPS)
 
 
 def _cut(where: str, ways: Sequence[Sequence[float]], tick: float) -> Estimate:
