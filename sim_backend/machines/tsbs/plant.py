@@ -153,8 +153,8 @@ class Plant(CorePlant):
         }
 
     def shaft(self) -> Array:
-        """True positions and rates of the shaft, (14,), as in `state`, which takes ten times as long."""
-        return np.frombuffer(_ffi.buffer(self._s.s)).copy()
+        """True positions and rates of the shaft, (14,), to be read; as in `state`, which takes ten times as long."""
+        return np.frombuffer(bytes(_ffi.buffer(self._s.s)), np.float64)
 
     def set_state(self, s: Array) -> None:
         """Put the shaft somewhere, for tests: (14,) positions and rates."""
