@@ -28,9 +28,9 @@ SAME_SHARE = 5e-3  # of lambda
 LATE_RAD = 0.02  # of the commutation: compensated, 1e-3 is left; not compensated, 0.05 at 30 rad/s
 NOISE_A = 0.05  # on an amplitude: ten of a sensor's standard deviations
 CONSTANT_N_m = 0.1  # one way: 1 % of a segment and 0.3 % of its sensor at 4 A
-SURE = 1.3
-"""In U: beyond, a speed contradicts its expectation. Most of U is the tolerance of the inertia, which has ends: an error of
-more than 1.2 U takes that and the ripple at the home angle at theirs."""
+SURE = 1.5
+"""In U: beyond, a speed contradicts its expectation. Four fifths of its variance is the tolerance of the inertia, which has
+ends: a rectangle with a normal part of half its standard deviation is beyond 1.5 U in 4 of 10 000 runs, beyond 1.3 U in 41."""
 TIME_CONSTANTS = 8.0  # J/B that a speed must have had after a change of the sharing
 
 

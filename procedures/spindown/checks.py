@@ -35,6 +35,7 @@ LARGEST_CARRYING_N_m = 0.1
 LARGEST_WAVE_RAD = 1.5e-3  # a sound run-down leaves 0.45 mrad rms, the counts of the encoder
 COUNT_N_m = 0.01  # of the drive's torque
 SURE = 3.0  # standard uncertainties beyond what is stated
+BRAKES = 2.5  # the same of the drive's constant torque: beyond all of 5 mN m by 2.5 times 2 are 8 of 10 000 sound drives
 LOWERED = "lowered"  # event: the drive did not bring the shaft to the speed asked for
 TICK_S = 0.45e-3  # the speed is a mean over a sample, the angle its last value
 
@@ -212,22 +213,20 @@ def of_drive(recording: Recording[Any], drag: Drag) -> Iterator[Finding]:
     """What the drive's own stream says: off while coasting, and as much constant torque at held speeds as the run-downs find,
     but for its own drag. The inertia is not in the drive's torque; the viscous part drops out of the line over the speed."""
     name = next((n for n, d in recording.rig.devices.items() if "drive" in d.roles), "")
-    if name not in recording.streams:
-        return
-    names = {c.name for c in recording.streams[name].channels}
+    names = {c.name for c in recording.streams[name].channels} if name in recording.streams else set()
     yield from drives_on(recording, names)
     torque = next((n for n in sorted(names) if n.endswith("torque")), None)
     if torque is None:
         return
     steps = [s for s in recording.steps("spin") if s.labels["by"] == "drive" and s.labels["group"] == "low"]
     held = [(float(s.labels["speed_rad_s"]), s.read(torque)[torque]) for s in steps]
-    found = constant_torque([(w, float(x.mean())) for w, x in held if len(x) >= 2])
+    found = constant_torque([(w, x) for w, x in held if len(x) >= 2])
     if found is None:
         return
     own, u = drive_drag(recording.rig), math.hypot(found[1], drag.seen.u)
     reach = stated_reach(own)
     apart = drag.seen.value - found[0] - own.value
-    if abs(apart) > reach + SURE * u:
+    if abs(apart) > reach + BRAKES * u:
         yield Finding(
             "drive-brakes",
             f"the drive gives {found[0] * 1e3:.1f} mN m of constant torque to hold the rotor at its speeds, the run-downs show "
@@ -237,22 +236,26 @@ def of_drive(recording: Recording[Any], drag: Drag) -> Iterator[Finding]:
         )  # fmt: skip
 
 
-def constant_torque(held: Sequence[tuple[float, float]]) -> tuple[float, float] | None:
-    """Torque at no speed and its u, N m, from held speeds (signed, rad/s) and torques; None without two speeds both ways.
-
-    The mean over both directions at each speed is free of a constant torque of the released motor, which drives one way and
-    brakes the other; u is that of the drive's resolution, COUNT_N_m (rectangular, each direction by itself).
-    """
+def constant_torque(held: Sequence[tuple[float, Array]]) -> tuple[float, float] | None:
+    """Torque at no speed and its u, N m, from held speeds (signed, rad/s) and the readings (n,) N m of each; None without two
+    speeds both ways. The mean over both directions at each speed is free of a constant torque of the released motor, which
+    drives one way and brakes the other."""
     ways: dict[float, dict[bool, list[float]]] = {}
-    for w, t in held:
-        ways.setdefault(round(abs(w), 3), {True: [], False: []})[w > 0].append(math.copysign(1, w) * t)
+    for w, x in held:
+        ways.setdefault(round(abs(w), 3), {True: [], False: []})[w > 0].append(math.copysign(1, w) * float(np.mean(x)))
     both = {w: (np.mean(of[True]) + np.mean(of[False])) / 2 for w, of in ways.items() if of[True] and of[False]}
     if len(both) < 2:
         return None
-    speeds = np.array(list(both))
-    variance = np.full(len(both), COUNT_N_m**2 / 12 / 2)
+    speeds, variance = np.array(list(both)), np.full(len(both), _variance([x for _, x in held]) / 2)
     fit = linear(np.column_stack([np.ones_like(speeds), speeds]), np.array(list(both.values())), variance)
     return float(fit.terms[0]), float(fit.u[0])
+
+
+def _variance(held: Sequence[Array]) -> float:
+    """Of the mean of a drive's readings, (N m)^2: they scatter by what the shaft meets as it turns, much the same at each
+    speed, and where they are alike the drive's resolution is left (rectangular)."""
+    scatter = [float(np.var(x, ddof=1)) / len(x) for x in held if len(x) > 1]
+    return max(COUNT_N_m**2 / 12, float(np.mean(scatter)) if scatter else 0.0)
 
 
 def of_inertia(rig: RigFile, drag: Drag) -> Iterator[Finding]:
