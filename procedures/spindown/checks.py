@@ -35,7 +35,7 @@ LARGEST_CARRYING_N_m = 0.1
 LARGEST_WAVE_RAD = 1.5e-3  # a sound run-down leaves 0.45 mrad rms, the counts of the encoder
 COUNT_N_m = 0.01  # of the drive's torque
 SURE = 3.0  # standard uncertainties beyond what is stated
-BRAKES = 2.5  # the same of the drive's constant torque: beyond all of 5 mN m by 2.5 times 2 are 8 of 10 000 sound drives
+BRAKES = 2.5  # of the drive's constant torque: 8 of 10 000 sound drives are beyond 5 mN m by 2.5 times 2
 LOWERED = "lowered"  # event: the drive did not bring the shaft to the speed asked for
 TICK_S = 0.45e-3  # the speed is a mean over a sample, the angle its last value
 
