@@ -17,12 +17,12 @@ import numpy.typing as npt
 
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
-from procedures.angle_step import amplitude, bounds, steps
+from procedures.angle_step import amplitude, bounds, settling, steps
 from procedures.angle_step.budget import OUTBOARD, at_motor, gained, within
 from procedures.angle_step.fine import Fine, fine
 from procedures.angle_step.paths import Peak, peak_of
 from procedures.angle_step.response import Response
-from procedures.angle_step.settling import WAYS, settled
+from procedures.angle_step.settling import WAYS
 from procedures.angle_step.standing import EACH, stands
 from procedures.angle_step.steps import Case, Done
 from procedures.angle_step.trend import noise
@@ -131,7 +131,13 @@ def _settling(
 ) -> Estimate:  # fmt: skip
     """The mean over the steps; `top`: what noise does to a turning point as it is read, rad, and the degrees of freedom by
     which it may be more; `same`: what turning points of all steps are off, counts."""
-    return settled(where, [f.settled for f in found], (max(top[0], EACH * count), top[1]), same, count)
+    of, noisy = [f.settled for f in found], (max(top[0], EACH * count), top[1])
+    if settling.jumps(of, noisy, same, count):
+        return settling.settled(where, of, noisy, same, count)
+    times, starts = _ways(found, [s.time for s in of]), _ways(found, [f.began.edge for f in found])
+    later = -float(np.mean([s.earlier(count) for s in of]))
+    scattered = _repeated(f"settling_time/{where}", "s", times, *noise(times, starts, later))
+    return scattered + settling.read(where, of, same, count) + _in(_loose(where, found) * later, "s")
 
 
 def _final(where: str, found: Sequence[Fine], done: Sequence[Done], count: float, kp: float) -> Estimate:

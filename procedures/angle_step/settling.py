@@ -2,7 +2,8 @@
 
 The time from the answer until the angle stays in its band jumps by half a swing where a swing only just touches the band. What
 is told is the mean over what the angle may be off: in each step by itself, which is noise, and in all steps of one way alike.
-Both have the jump in them where it may happen, and nothing of it where a swing surely stays or leaves.
+Both have the jump in them where it may happen, and nothing of it where a swing surely stays or leaves. Where the steps of a way
+all end in the same swing, what noise does is what their times scatter by: that of the first top, which is higher, is more.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from procedures.angle_step.course import Course
 
 Array = npt.NDArray[np.float64]
 WAYS = (True, False)  # to the angle, and back
-QUANTILES = 41  # by which an angle that is unsure may be off
+SHARES = (np.arange(41) + 0.5) / 41  # quantiles by which an angle that is unsure may be off
 SURE = 10**6  # degrees of freedom
 
 
@@ -35,13 +36,26 @@ class Settling:
     answers: float
     loose: bool = False
 
-    def times(self, unsure: float, dof: int = SURE) -> Array:
-        """The settling time, s, by angles that are off by so much, rad, times the quantiles of t: where a swing ends within
-        that of the band, some have it and some do not."""
-        from scipy import special
-
-        off = unsure * special.stdtrit(dof, (np.arange(QUANTILES) + 0.5) / QUANTILES)
+    def times(self, off: Array) -> Array:
+        """The settling time, s, by angles that are `off`, rad: where a swing ends within that of the band, some have it, some
+        do not."""
         return np.array([self.course.last_outside(self.size, self.band - by) for by in off]) - self.answers
+
+    @property
+    def time(self) -> float:
+        """That of the angle as it is read."""
+        return float(self.times(np.zeros(1))[0])
+
+    def earlier(self, count: float) -> float:
+        """By how much, s, it settles earlier from a start that is a `count`, rad, further: its swings are smaller by that share
+        of the step, as if the band were wider by it."""
+        return self.time - float(self.times(np.array([-self.band * count / self.size]))[0])
+
+    def swells(self, first: float, last: float) -> float:
+        """By how much, rad, the distance to the target grows again between two settling times, s: between swings it does."""
+        t = self.course.t - self.answers
+        far = np.abs(self.course.y[(t >= first) & (t <= last)] - self.size)
+        return float(np.max(far - np.minimum.accumulate(far), initial=0.0))
 
 
 def settled(
@@ -50,17 +64,47 @@ def settled(
     """The mean over the steps, s, and over what their angles may be off; `noisy`: what noise does to a turning point as it is
     read, rad, and the degrees of freedom by which it may be more; `between` counts: what all turning points of one way are off
     alike. A start that is a count further makes all swings smaller as it does the step, one at the band by that share of it."""
-    off = [math.hypot(noisy[0], s.band * count / s.size / math.sqrt(12) if s.loose else 0.0) for s in found]
-    each = np.array([s.times(by, noisy[1]) for s, by in zip(found, off, strict=True)])
-    alike = np.array([s.times(s.course.unsure(between, count)) for s in found])
+    each = np.array([s.times(_off(s, noisy, count)) for s in found])
     chance = Influence(id=f"scatter/settling_time/{where}", name="whether a swing leaves the band", unit="s", kind="B",
                        u=math.sqrt(float(each.var(axis=1).sum())) / len(found), distribution="normal")  # fmt: skip
+    return Estimate.of(float(each.mean()), chance) + read(where, found, between, count)
+
+
+def jumps(found: Sequence[Settling], noisy: tuple[float, int], between: float, count: float) -> bool:
+    """Whether the steps of one way may end in one swing or in another, by what their angles may be off, as in `settled`."""
+    off = [(_off(s, noisy, count), _normal(s.course.unsure(between, count))) for s in found]
+    every = np.array([s.times(np.concatenate(by)) for s, by in zip(found, off, strict=True)])
+    for way in WAYS:
+        here = [k for k, s in enumerate(found) if s.forward is way]
+        first, last = float(every[here].min(initial=math.inf)), float(every[here].max(initial=-math.inf))
+        if any(found[k].swells(first, last) > np.max(off[k]) for k in here):
+            return True
+    return False
+
+
+def _off(s: Settling, noisy: tuple[float, int], count: float) -> Array:
+    """Quantiles of what noise and a loose start make of a step's angle, rad."""
+    from scipy import special
+
+    unsure = math.hypot(noisy[0], s.band * count / s.size / math.sqrt(12) if s.loose else 0.0)
+    return np.asarray(unsure * special.stdtrit(noisy[1], SHARES))
+
+
+def _normal(u: float) -> Array:
+    """Quantiles of what is normal, rad."""
+    from scipy import special
+
+    return np.asarray(u * special.ndtri(SHARES))
+
+
+def read(where: str, found: Sequence[Settling], between: float, count: float) -> Estimate:
+    """Zero, s, with what turning points do that are off in all steps of one way alike, by `between` counts."""
+    alike = np.array([s.times(_normal(s.course.unsure(between, count))) for s in found])
     ways = [np.array([a for a, s in zip(alike, found, strict=True) if s.forward is way]) for way in WAYS]
     variances = [float(way.mean(axis=0).var()) for way in ways if len(way)]
-    read = Influence(id=f"edges/settling/{where}", name="encoder between its counts", unit="s", kind="B",
-                     u=math.sqrt(sum(variances)) / len(variances),
-                     distribution="normal")  # fmt: skip
-    return Estimate.of(float(each.mean()), chance) + Estimate.of(0.0, read)
+    influence = Influence(id=f"edges/settling/{where}", name="encoder between its counts", unit="s", kind="B",
+                          u=math.sqrt(sum(variances)) / len(variances), distribution="normal")  # fmt: skip
+    return Estimate.of(0.0, influence)
 
 
 def split(found: Sequence[Settling], values: Sequence[float]) -> list[list[float]]:

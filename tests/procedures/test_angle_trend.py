@@ -4,6 +4,7 @@ stands that trembles at an edge of its encoder."""
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
@@ -19,6 +20,7 @@ from procedures.angle_step.trend import noise
 
 COUNT = 2 * math.pi / 4096
 SURE = Began(-0.5, False)
+SIZE = 22.8 * COUNT
 
 
 @pytest.mark.parametrize("repeats", [5, 6, 8])
@@ -88,13 +90,14 @@ def swings(heights: list[float], began: Began = SURE, band: float = 2.0) -> list
     out = []
     for k, height in enumerate(heights):
         y = np.where(t < 0.07, 20 * (1 - t / 0.07), 0.0) + height * np.exp(-(((t - 0.095) / 0.006) ** 2))
-        out.append(Fine(k % 2 == 0, 0.02, 0.0, 0.3, None, Course(t, y * COUNT, 87.0), 0.0, band * COUNT, 0, began))
+        of = Course(t, SIZE + y * COUNT, 87.0)
+        out.append(Fine(k % 2 == 0, 0.02, 0.0, 0.3, None, of, SIZE, band * COUNT, 0, began))
     return out
 
 
 def told(heights: list[float], noise: float, dof: int = 10, began: Began = SURE) -> tuple[float, float]:
     """Value and standard uncertainty of settling, s, where noise moves a turning point by so many counts."""
-    found = _settling("here", swings(heights, began), (noise * COUNT, dof), alike(22.8 * COUNT, COUNT), COUNT)
+    found = _settling("here", swings(heights, began), (noise * COUNT, dof), alike(SIZE, COUNT), COUNT)
     return found.value, found.u
 
 
@@ -208,3 +211,31 @@ def test_a_rotor_that_stays_within_a_count_is_anywhere_in_it(push: float) -> Non
     found = stands(done([7.0] * 400, target=7.3), COUNT, push)
     assert (found.error, found.half) == (pytest.approx(-0.3 * COUNT), COUNT / 2)
     assert stands(done([7.0, 8.0] * 200), COUNT, math.nan).half == COUNT / 2
+
+
+def scattering(us: float, rng: np.random.Generator) -> list[Fine]:
+    """Sixteen steps whose last swing leaves the band at 105 ms, and scatters by so many microseconds."""
+    t = np.arange(3000) * 1e-4
+    out = []
+    for k, late in enumerate(rng.normal(0, us * 1e-6, 16)):
+        y = 20 * np.exp(-(t - late) / 0.03) * np.cos(2 * np.pi * (t - late) / 0.07)
+        of = Course(t, SIZE - y * COUNT, 87.0)
+        out.append(Fine(k % 2 == 0, 0.02, 0.0, 0.3, None, of, SIZE, 0.5 * COUNT, 0, SURE))
+    return out
+
+
+def test_noise_of_the_first_top_is_not_that_of_the_last_swing() -> None:
+    """0.02 of a count there; times scatter by 20 us, far less than that would make of them."""
+    rng = np.random.default_rng(3)
+    found = [_settling("here", scattering(20.0, rng), (0.02 * COUNT, 10), 0.0, COUNT) for _ in range(40)]
+    assert np.sqrt(np.mean([e.u**2 for e in found])) == pytest.approx(5e-6, rel=0.1)
+    assert {next(iter(e.sensitivities)).dof for e in found} == {9.0}
+    assert np.std([e.value for e in found], ddof=1) == pytest.approx(5e-6, rel=0.3)
+
+
+def test_a_start_further_on_settles_earlier() -> None:
+    of = scattering(0.0, np.random.default_rng(3))[0].settled
+    smaller = of.course.y + (SIZE - of.course.y) / 22.8  # a start that is a count further
+    again = replace(of, course=replace(of.course, y=smaller))
+    assert of.earlier(COUNT) == pytest.approx(of.time - again.time, rel=0.1)
+    assert of.time > again.time

@@ -75,10 +75,12 @@ def _drifted(p: PlantParams, at_s: float) -> PlantParams:
     def offsets(zero: tuple[float, ...], rate: tuple[float, ...]) -> tuple[float, ...]:
         return tuple(z + r * at_s for z, r in zip(zero, rate, strict=True))
 
-    segments = offsets(p.segment_offset, p.segment_drift)
+    segments, scale = offsets(p.segment_offset, p.segment_drift), 1 + p.segment_scale_drift * at_s
+    gains = [scale * gain for gain in p.segment_sense]
     return replace(
         p, current_offset=offsets(p.current_offset, p.current_drift), current_drift=(0.0,) * len(p.current_drift),
         segment_offset=(segments[0], segments[1], segments[2], segments[3]), segment_drift=(0.0,) * 4,
+        segment_sense=(gains[0], gains[1], gains[2], gains[3]), segment_scale_drift=0.0,
     )  # fmt: skip
 
 
