@@ -8,7 +8,10 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 import numpy.typing as npt
 
+from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
+from procedures.servomotor.conventions import Servomotor
+from procedures.shared.certificates import certified
 
 Array = npt.NDArray[np.float64]
 OUTBOARD: Mapping[str, float] = {"xo": 1.0, "yo": 1.0}
@@ -26,6 +29,15 @@ def within(identity: str, name: str, half: float, unit: str) -> Estimate:
         id=identity, name=name, u=half / math.sqrt(3), unit=unit, kind="B", distribution="rectangular"
     )
     return Estimate.of(0.0, influence)
+
+
+def placed(rig: RigFile, machine: Servomotor, grows: float) -> Estimate:
+    """Zero, m, with what the lengths along the shaft do to a peak at the motor that `grows` by so many metres with the outboard
+    sensors' share of it, (z_m + l_is)/(l_is + l_os)."""
+    names = ("com_to_motor", *machine.sensors)
+    z, l_is, l_os = (certified(f"geometry/{name}", rig.geometry[name]) for name in names)
+    share = (z + l_is) / (l_is + l_os)
+    return Estimate(0.0, "m", {i: c * grows for i, c in share.sensitivities.items()})
 
 
 def gained(

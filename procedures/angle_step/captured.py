@@ -18,9 +18,9 @@ import numpy.typing as npt
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
 from procedures.angle_step import amplitude, bounds, settling, steps
-from procedures.angle_step.budget import OUTBOARD, at_motor, gained, within
+from procedures.angle_step.budget import OUTBOARD, at_motor, gained, placed, within
 from procedures.angle_step.fine import Fine, fine
-from procedures.angle_step.paths import Peak, peak_of
+from procedures.angle_step.paths import Peak, levered, peak_of, slow
 from procedures.angle_step.response import Response
 from procedures.angle_step.settling import WAYS
 from procedures.angle_step.standing import EACH, stands
@@ -48,7 +48,8 @@ def by_case(
     each other. `bands` rad of settling, `count` rad of the encoder, `kp` A/rad."""
     whole: dict[Case, list[Fine]] = {}
     short: dict[Case, int] = {}
-    done = {case: [d for d in of if d.swing is not None] for case, of in steps.by_case(list(moves)).items()}
+    done = {case: [d for d in of if d.swing is not None and not slow(float(d.swing.t[1]))]
+            for case, of in steps.by_case(list(moves)).items()}  # fmt: skip
     for case, of in done.items():
         if min(sum((d.move.step > 0) is way for d in of) for way in WAYS) < 2:
             continue  # the run ended within this case
@@ -141,12 +142,13 @@ def _settling(
 
 
 def _final(where: str, found: Sequence[Fine], done: Sequence[Done], count: float, kp: float) -> Estimate:
-    """The mean of where the rotor stands, which is much the same in all steps of one way."""
+    """The mean of how far beyond its reference the rotor stands, which is much the same in all steps of one way."""
     gains = [f.course.gain for f in found if math.isfinite(f.course.gain)]
     push = kp * count * float(np.median(gains)) if gains else math.nan
     at = [stands(d, count, push) for d in done]
     half = float(np.mean([a.half for a in at]))
-    return Estimate.exact(float(np.mean([a.error for a in at])), "rad") + within(
+    ways = [math.copysign(1.0, d.move.step) for d in done]
+    return Estimate.exact(float(np.mean([w * a.error for w, a in zip(ways, at, strict=True)])), "rad") + within(
         f"standing/{where}", "where it stands by its counts", half, "rad"
     )
 
@@ -160,14 +162,18 @@ def _peaks(where: str, found: Sequence[Fine], done: Sequence[Done], rig: RigFile
     machine = conventions(rig)
     gains = {axis: certified_gain(rig, channel) for axis, channel in machine.positions.items()}
     share = machine.sensor_share(rig.geometry["com_to_motor"].value, rig)
-    outboard, motor, rests = [], [], []
+    outboard, motor, rests, grows = [], [], [], []
     for way in WAYS:
         pairs = [(f, d) for f, d in zip(found, done, strict=True) if f.forward is way]
         swings = [d.swing for _, d in pairs if d.swing is not None]
-        loud = bounds.noise_of(rig, tuple(machine.positions.values()), 1 / float(swings[0].t[1]))
+        tick = float(swings[0].t[1])
+        loud = bounds.noise_of(rig, tuple(machine.positions.values()), 1 / tick)
         after = [slice(f.answers, None) for f, _ in pairs]
-        outboard.append(peak_of([s.orbit[:, a] for s, a in zip(swings, after, strict=True)], loud))
-        motor.append(peak_of([s.motor[:, a] for s, a in zip(swings, after, strict=True)], loud * swings[0].spread))
+        beside, paths = ([p[:, a] for p, a in zip(of, after, strict=True)]
+                         for of in ([s.orbit for s in swings], [s.motor for s in swings]))  # fmt: skip
+        outboard.append(peak_of(beside, loud, tick))
+        motor.append(peak_of(paths, loud * swings[0].spread, tick))
+        grows.append(levered(paths, beside, share, tick))
         rests.append(np.mean([d.move.rest_orbit.mean(axis=1) for _, d in pairs], axis=0))
     still = [(float(np.hypot(*x)), x / max(float(np.hypot(*x)), 1e-300)) for x in rests]
     rest = Estimate.exact(float(np.mean([radius for radius, _ in still])), "m")
@@ -177,7 +183,8 @@ def _peaks(where: str, found: Sequence[Fine], done: Sequence[Done], rig: RigFile
     return {
         "peak_outboard": at_outboard,
         "peak_motor": _peak(f"motor/{where}", motor)
-        + gained(((p.radius, p.towards) for p in motor), at_motor(share), gains),
+        + gained(((p.radius, p.towards) for p in motor), at_motor(share), gains)
+        + placed(rig, machine, float(np.mean(grows))),
         "excess": at_outboard - rest - gained(still, OUTBOARD, gains),
     }
 

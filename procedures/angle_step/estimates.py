@@ -11,7 +11,7 @@ import numpy as np
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
 from procedures.angle_step import captured, counted, steps
-from procedures.angle_step.budget import OUTBOARD, at_motor, gained, within
+from procedures.angle_step.budget import OUTBOARD, at_motor, gained, placed, within
 from procedures.angle_step.response import Excursion, Response, response
 from procedures.angle_step.steps import Case, Done
 from procedures.servomotor.conventions import conventions
@@ -47,6 +47,8 @@ def by_case(moves: list[Done], rig: RigFile, band: float, count_rad: float, kp: 
     for case, done in steps.by_case(moves).items():
         r = responses[case]
         found = _estimates(case, r, gains, share, count_rad, period, tick)
+        grows = float(np.mean([x.motor.peak for x in r])) / share  # the inboard plane is held
+        found["peak_motor"] = found["peak_motor"] + placed(rig, machine, grows)
         if all(math.isfinite(x.settling) for x in r) and case not in finer:
             found["settling_time"] = counted.settling_time(case.where, done, bands[case], count_rad)
         out[case] = Result(case, r, found | finer.get(case, {}), short.get(case, 0))

@@ -65,7 +65,7 @@ def fine(done: Done, swing: Swing, settling: float, band: float, count: float) -
     found, answers = edges(swing.t, swing.angle, count).since(start + turns, way), answer(swing)
     angle = course(found, swing.t, way * (swing.angle - start - turns), way * swing.torque, answers)
     low, high = angle.crossing(0.1 * size), angle.crossing(0.9 * size)
-    if not math.isfinite(high) or float(swing.t[answers]) + settling + SWING_S > swing.t[-1]:
+    if not math.isfinite(high - low) or float(swing.t[answers]) + settling + SWING_S > swing.t[-1]:
         return None
     return Fine(
         forward=way > 0,

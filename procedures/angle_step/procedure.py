@@ -24,8 +24,8 @@ from procedures.angle_step import bounds, response
 from procedures.angle_step.plan import Plan
 from procedures.angle_step.requires import requires
 from procedures.angle_step.response import Loop
-from procedures.angle_step.steps import STEP, Case, Done, cases, read_moves
-from procedures.servomotor import carrying, hold, segments, wiring
+from procedures.angle_step.steps import STEP, Case, Done, cases, read_moves, readings_of
+from procedures.servomotor import carrying, encoder, hold, segments, wiring
 from procedures.servomotor.conventions import conventions
 from procedures.servomotor.parameters import named, stated, write
 from procedures.shared import assumptions
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 RISE = Quantity("rise_time", "s", "10 to 90 % of the step of the angle")
 OVERSHOOT = Quantity("overshoot", "1", "greatest angle beyond the step, as a share of it")
 SETTLING = Quantity("settling_time", "s", "from the answer of the torque current until the angle stays in the band")
-FINAL = Quantity("final_error", "rad", "angle at the end less its reference")
+FINAL = Quantity("final_error", "rad", "how far beyond its reference the angle ends, in the direction of the step")
 PEAK = Quantity("peak", "m", "greatest distance off centre during the step, at the sensor of a bearing or at the motor")
 EXCESS = Quantity("excess", "m", "peak at the outboard sensor above that at standstill", title="excess over standstill")
 SATURATED = Quantity("saturated", "s", "how long an amplifier of the motor cut its demand")
@@ -46,6 +46,7 @@ CAPTURED = (AMPLITUDE, BOUND)
 MEASURES = (RISE, OVERSHOOT, SETTLING, FINAL, PEAK, EXCESS, SATURATED, *CAPTURED)
 TORQUE_CONSTANT = 2.87  # N m/A, T Table 6.2; for predictions before a run, and for nothing that is measured
 UPLOAD_S = 0.6  # what the upload of a capture is given at least, by whatever link
+LEAST = 12  # encoder counts of a step: the rotor may stand a count on, and 10 % of the step are beyond that
 CODES = {"static": 0.0, "priority": 1.0}
 
 
@@ -152,6 +153,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     plan, rig = recording.plan, recording.rig
     moves = read_moves(recording)
     findings.gate(checks.of_signals(moves, conventions(rig), plan), checks.FATAL)
+    findings.gate(encoder.of_counts(readings_of(moves), plan.encoder_counts))
     by_case = estimates.by_case(moves, rig, plan.band, 2 * math.pi / plan.encoder_counts, plan.kp_theta)
     findings.add(checks.of_responses(by_case, plan, {c: _loop(rig, plan, c) for c in by_case}))
     findings.add(checks.compared(by_case))
@@ -180,10 +182,10 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     if len(set(plan.allocations)) < len(plan.allocations) or len(set(plan.filters_hz)) < len(plan.filters_hz):
         yield "allocations, filters_hz: found one twice; expected each once"
     sizes = {case.size for case in planned(plan)}
-    if any(not 4 * math.pi / plan.encoder_counts < s <= math.pi / 2 for s in sizes):
-        least = 720 / plan.encoder_counts
-        yield f"steps_rad: found {min(sizes):g} to {max(sizes):g}; expected above two encoder counts " \
-              f"({least:.2g} deg), up to a quarter turn"  # fmt: skip
+    if any(not LEAST * math.tau / plan.encoder_counts <= s <= math.pi / 2 for s in sizes):
+        least = LEAST * 360 / plan.encoder_counts
+        yield f"steps_rad: found {min(sizes):g} to {max(sizes):g}; expected {LEAST} encoder counts " \
+              f"({least:.2g} deg) to a quarter turn"  # fmt: skip
     else:
         yield from _too_fast(rig, plan)
 

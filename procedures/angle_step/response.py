@@ -93,7 +93,7 @@ def response(m: Move, band: float) -> Response:
     period = float(np.median(np.diff(m.t)))
     sign, size = math.copysign(1.0, m.step), abs(m.step)
     y = m.angle * sign
-    low, high = _crossing(m.t, y, 0.1 * size), _crossing(m.t, y, 0.9 * size)
+    high, low = _crossing(m.t, y, 0.9 * size), _crossing(m.t, y, 0.1 * size)
     outside = np.flatnonzero(np.abs(y - size) > band)
     settled = 0.0 if not len(outside) else float(m.t[min(outside[-1] + 1, len(m.t) - 1)])
     if len(outside) and outside[-1] >= len(y) - 2:
@@ -103,7 +103,7 @@ def response(m: Move, band: float) -> Response:
         rise=high[0] - low[0],
         settling=settled,
         overshoot=max(float(y.max()) / size - 1, 0.0),
-        final_error=float((m.angle[tail] - m.step).mean()),
+        final_error=sign * float((m.angle[tail] - m.step).mean()),
         outboard=excursion(m.orbit, m.rest_orbit, m.means),
         motor=excursion(m.motor, m.rest_motor, m.means),
         saturated=float(m.saturated.sum()) * period,
@@ -117,9 +117,14 @@ def _crossing(t: Array, y: Array, level: float) -> tuple[float, float]:
     stairs of it, so that the two neighbours would not do, and a line through some that turn upwards passes above the one in the
     middle (a rise of 20 ms came out 0.1 ms too long)."""
     above = np.flatnonzero(y >= level)
-    if not len(above) or above[0] == 0:
+    if not len(above):
         raise AnalysisError(
             f"the angle reaches {np.degrees(y.max()):.2f} deg; expected at least {np.degrees(level):.2f} deg"
+        )
+    if above[0] == 0:
+        raise AnalysisError(
+            f"the rotor stands {np.degrees(y[0]):.2f} deg on before its step begins, beyond {np.degrees(level):.2f} deg of it: "
+            "give steps of more encoder counts"
         )
     k = int(above[0])
     near = slice(max(k - NEAR, 0), k + NEAR + 1)

@@ -22,6 +22,7 @@ Array = npt.NDArray[np.float64]
 WAYS = (True, False)  # to the angle, and back
 SHARES = (np.arange(41) + 0.5) / 41  # quantiles by which an angle that is unsure may be off
 SURE = 10**6  # degrees of freedom
+STANDS = 1.5  # counts off its reference: where it may end, for good
 
 
 @dataclass(frozen=True)
@@ -83,11 +84,13 @@ def jumps(found: Sequence[Settling], noisy: tuple[float, int], between: float, c
 
 
 def _off(s: Settling, noisy: tuple[float, int], count: float) -> Array:
-    """Quantiles of what noise and a loose start make of a step's angle, rad."""
+    """Quantiles of what noise and a loose start make of a step's angle, rad; not so far that the angle would be outside its
+    band while it stands and trembles, by which no swing is told."""
     from scipy import special
 
     unsure = math.hypot(noisy[0], s.band * count / s.size / math.sqrt(12) if s.loose else 0.0)
-    return np.asarray(unsure * special.stdtrit(noisy[1], SHARES))
+    most = max(s.band - STANDS * count, 0.0)
+    return np.asarray(np.clip(unsure * special.stdtrit(noisy[1], SHARES), -most, most))
 
 
 def _normal(u: float) -> Array:

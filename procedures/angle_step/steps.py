@@ -76,6 +76,12 @@ def by_case(moves: list[Done]) -> Mapping[Case, list[Done]]:
     return out
 
 
+def readings_of(moves: list[Done]) -> list[Array]:
+    """Angles as the encoder tells them, rad, by steps: captured, or telemetry that is no mean."""
+    found = [(d.swing.angle if d.swing is not None else None, d.move) for d in moves]
+    return [a if a is not None else m.angle for a, m in found if a is not None or not m.means]
+
+
 def _read(recording: Recording[Any], step: Step, machine: Servomotor, share: float) -> Done:
     data, reference = step.read(*channels(machine)), parameter(recording.rig, "angle.ref")
     written = [e["t_ns"] for e in recording.events("parameter")

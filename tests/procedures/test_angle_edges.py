@@ -16,7 +16,8 @@ from procedures.angle_step.paths import peak_in_noise
 
 Array = npt.NDArray[np.float64]
 COUNT = 2 * math.pi / 4096
-T = np.arange(4000) * 1e-4
+TICK = 1e-4
+T = np.arange(4000) * TICK
 
 
 def swing(size: float, hz: float, damping: float, start: float = 0.0) -> Array:
@@ -118,7 +119,7 @@ def test_a_peak_is_freed_of_what_noise_adds(height: float) -> None:
     off, kept = [], []
     for seed in range(12):
         noise = np.random.default_rng(seed).normal(0, 1.6e-7, (2, 4000))
-        peak, towards, raised = peak_in_noise(np.array([0 * T, flat]) + noise, 1.6e-7)
+        peak, towards, raised = peak_in_noise(np.array([0 * T, flat]) + noise, 1.6e-7, TICK)
         off.append(peak - raised.by - height)
         kept.append(peak - height)
         assert towards == pytest.approx((0.0, 1.0), abs=0.15)

@@ -140,7 +140,7 @@ class _Carried:
         torque = after.trace[:, SEGMENTS[:: 2 if self.p.phases == 6 else 1]].mean(axis=1)
         first = int(np.argmax(np.abs(torque) > ANSWERS * np.abs(torque).max()))
         values = list(_response(way * (after.angle - (target - way * case.size)), first, case))
-        values.append(("final_error", tail - target))
+        values.append(("final_error", way * (tail - target)))
         values.append(("saturated", _cut(after.trace, self.p.segment_limit, self.p.phases)))
         if self.p.phases == 6:
             values.append(("amplitude", self._amplitude(after.trace)))
