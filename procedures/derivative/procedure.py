@@ -19,7 +19,7 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.capture import Layout
-from procedures.derivative.fitting import lines_clear
+from procedures.derivative.fitting import in_range, lines_clear
 from procedures.derivative.plan import Plan
 from procedures.derivative.requires import requires
 from procedures.derivative.steps import LINE, OFFSET, QUIET, asked, read_taken
@@ -35,12 +35,13 @@ ERROR = Quantity("error", "1", "RMS of velocity less derivative, over the deriva
 SIDEBAND = Quantity("sideband", "1", "of that what is at f +- n/eps: what changes from reset to reset")
 LOW = Quantity("edge_low", "Hz", "below it the error is more than the limit", title="lower edge")
 HIGH = Quantity("edge_high", "Hz", "above it the error is more than the limit", title="upper edge")
-AT = Quantity("error_at", "1", "error at the plan's frequency, between the lines", title="error at 40 Hz")
+AT = Quantity(
+    "error_at", "1", "error at the plan's frequency, between the lines", title="error at the plan's frequency"
+)
 FALSE = Quantity("false_derivative", "1/s", "mean velocity per constant position")
 NOISE = Quantity("noise_gain", "1/s", "RMS of the velocity per rms of white noise in the position")
 BY_LINE, WHOLE = (GAIN, PHASE, ERROR, SIDEBAND), (LOW, HIGH, AT, FALSE, NOISE)
 MEASURES = (*WHOLE, *BY_LINE)
-MARGIN = 0.8  # of the clearance that offset and injection may use
 ESTIMATOR = "overlapping"
 
 
@@ -144,6 +145,7 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
         yield f"lines_hz: found {plan.lines_hz}; expected above 0, each once, in order, up to {0.4 / tick_s:g} Hz"
     else:
         yield from lines_clear(plan, machine.known(rig, "harmonic_hz"))
+    yield from in_range(rig, machine, plan)
     room = rig.capture.memory_bytes / Layout.of(rig.capture, machine.captured).sample.itemsize * tick_s
     if (longest := seconds(plan, min(plan.lines_hz, default=1.0))) > room:
         yield f"lines_hz: {min(plan.lines_hz):g} Hz takes {longest:.3g} s; the controller's memory holds {room:.3g} s"

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from bench.findings import Effect, Finding
 from bench.rigfile.roles import Status
+from bench.uncertainty import Estimate
 from procedures.estimator_compare.estimates import Result
 from procedures.estimator_compare.plan import Plan
 from procedures.estimator_compare.requires import ENGAGE, HANG
@@ -15,6 +17,9 @@ from procedures.estimator_compare.steps import Taken
 from procedures.one_axis.bank import Array, aligned
 
 OVERLAPPING, FEW, MISMATCH = "overlapping", 4, 1e-4  # which is held against its weights, in so many captures
+APART = (  # those whose errors and noise differ on any machine; a difference's noise may be that of the overlapping filters
+    {"single", "overlapping"}, {"single", "observer"}, {"overlapping", "observer"}, {"difference", "observer"},
+)  # fmt: skip
 SAME = 1e-6  # of the rms of two estimators' velocities in the same repeat: they are one
 
 
@@ -62,26 +67,34 @@ def of_result(result: Result, plan: Plan, predicted: float | None) -> Iterator[F
 
 
 def of_weights(taken: Sequence[Taken], rows: Array) -> Iterator[Finding]:
-    """Whether the overlapping estimate is what its weights make of the captured position."""
-    mine = [t for t in taken if t.estimator == OVERLAPPING]
-    worst = max((aligned(rows, t.y, t.v)[1] for t in mine[:FEW]), default=0.0)
+    """Whether the overlapping estimate is what its weights make of the captured position, and none of the others is."""
+    by: dict[str, list[Taken]] = {}
+    for t in taken:
+        by.setdefault(t.estimator, []).append(t)
+    off = {name: [aligned(rows, t.y, t.v)[1] for t in each[:FEW]] for name, each in by.items()}
+    worst = max(off.pop(OVERLAPPING, ()), default=0.0)
     if worst > MISMATCH:
         text = (f"the velocity is not what the controller's degree, spacing and rule make of the captured position: off by "
                 f"{worst:.2%} of its rms ({MISMATCH:.2%} allowed). Look at it with `derivative`.")  # fmt: skip
         yield Finding("not-this-estimator", text, OVERLAPPING, Effect.INDETERMINATE)
+    for name in (name for name, each in off.items() if min(each) < MISMATCH):
+        text = (f"the velocity of {name} is what the two overlapping filters make of the captured position, to "
+                f"{min(off[name]):.1g} of its rms: the controller runs them for it.")  # fmt: skip
+        yield Finding("estimators-alike", text, name, Effect.INDETERMINATE)
 
 
 def _same(result: Result, plan: Plan) -> Iterator[Finding]:
+    """By the scatter alone: the sensor's gain is common to two of one machine."""
     for name, pair in (("velocity_error", plan.engaged), ("velocity_noise", plan.loaded)):
         for k, a in enumerate(pair):
-            for b in pair[k + 1 :]:
+            for b in (b for b in pair[k + 1 :] if {a, b} in APART):
                 x, y = (result.estimates[name][e] for e in (a, b))
-                if abs(x.value - y.value) < 2 * max(x.u, y.u, SAME * x.value) and {a, b} <= {
-                    "single",
-                    "overlapping",
-                    "observer",
-                }:
-                    text = (
-                        f"{a} and {b} have the same {name.replace('_', ' ')}: the controller may run one for the other."
-                    )
+                scatter = max(_scatter(x), _scatter(y), SAME * x.value)
+                if abs(x.value - y.value) < 2 * scatter:
+                    what = name.replace("_", " ")
+                    text = f"{a} and {b} have the same {what}: the controller may run one for the other."
                     yield Finding("estimators-alike", text, f"{a}, {b}", Effect.INDETERMINATE)
+
+
+def _scatter(x: Estimate) -> float:
+    return math.hypot(*(c * i.u for i, c in x.sensitivities.items() if i.kind == "A"))

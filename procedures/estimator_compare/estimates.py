@@ -2,13 +2,17 @@
 
 What is measured is a size, and goes by the moment: rms positions after a switch are 1 to 28 um, skewed, their logarithms are
 not. Means of ten had 0.92 of their intervals hold the truth, and five times as many errors beyond 3 U as Student's t has;
-geometric means have 0.947, and tails as t."""
+geometric means have 0.947, and tails as t.
+
+Positions and velocities are captured as the sensor reads them. What is told in m, m s and m/s is the shaft's own motion: the
+reading over the sensor's certified gain. Ratios and the velocity's error know no gain; that of the disturbance is the
+controller's own number."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -22,13 +26,15 @@ from procedures.estimator_compare.steps import Taken, of_kind
 
 Array = npt.NDArray[np.float64]
 SWITCHED, LOADED = ("velocity_error", "disturbance_error", "y_50_100"), ("peak", "integral", "quiet", "velocity_noise")
+MOTIONS = ("y_50_100", *LOADED)  # of the shaft, which the sensor's gain scales
 UNITS = {"velocity_error": "1", "disturbance_error": "N", "y_50_100": "m", "peak": "m", "integral": "m s", "quiet": "m",
          "velocity_noise": "m/s"}  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Result:
-    """By quantity and estimator the values (repeats,), the estimates, and those of ratios by quantity and pair."""
+    """By quantity and estimator the values (repeats,) as the sensor reads them, the estimates of the shaft's own motion, and
+    ratios by quantity and pair."""
 
     values: Mapping[str, Mapping[str, Array]]
     estimates: Mapping[str, Mapping[str, Estimate]]
@@ -36,8 +42,8 @@ class Result:
     taken: tuple[Taken, ...]
 
 
-def evaluate(taken: Sequence[Taken], plan: Plan, harmonic_hz: float) -> Result:
-    """Every estimate; `harmonic_hz` is what the controller takes for the exciter's frequency.
+def evaluate(taken: Sequence[Taken], plan: Plan, harmonic_hz: float, gain: Estimate) -> Result:
+    """Every estimate; `harmonic_hz` is what the controller takes for the exciter's frequency, `gain` the position sensor's.
 
     Raises:
         AnalysisError: a switch or a load cannot be found in its capture.
@@ -53,9 +59,7 @@ def evaluate(taken: Sequence[Taken], plan: Plan, harmonic_hz: float) -> Result:
         found = np.array([_of_load(t, plan) for t in of_kind(taken, HANG, estimator)])
         for name, column in zip(LOADED, found.T, strict=True):
             values[name][estimator] = column
-    estimates = {
-        name: {e: _typical(x, UNITS[name], f"{name}/{e}") for e, x in by.items()} for name, by in values.items()
-    }
+    estimates = {name: {e: _told(name, e, x, gain) for e, x in by.items()} for name, by in values.items()}
     return Result(values, estimates, _ratios(values, plan), tuple(taken))
 
 
@@ -73,6 +77,12 @@ def _of_load(t: Taken, plan: Plan) -> tuple[float, ...]:
     at = fit.moved_at(t.y, lead, t.tick_s)
     quiet = slice(0, min(at, lead))
     return (*fit.answer(t.y, at, t.tick_s), float(t.y[quiet].std()), fit.above(t.v[quiet], t.tick_s))
+
+
+def _told(name: str, estimator: str, x: Array, gain: Estimate) -> Estimate:
+    """A quantity of one estimator, of the shaft where the sensor's gain is in its values."""
+    read = _typical(x, UNITS[name], f"{name}/{estimator}")
+    return replace(read / gain, unit=UNITS[name]) if name in MOTIONS else read
 
 
 def _typical(x: Array, unit: str, identity: str, name: str = "scatter of the repeats") -> Estimate:

@@ -25,7 +25,7 @@ def _loaded(result: Result, plan: Plan) -> Figure:
         use = slice(max(at - 500, 0), at + 6000)
         time = np.asarray((np.arange(len(t.y)) - at) * t.tick_s * 1e3, np.float64)
         series.append(Series(estimator, time[use], 1e6 * (t.y - t.y[:at].mean())[use]))
-    caption = "Position of the first repeat, from where it was."
+    caption = "Position of the first repeat as the sensor reads it, from where it was."
     return Figure("load", "Answer to the load", caption, "time (ms)", "position (µm)", tuple(series))
 
 
@@ -37,7 +37,7 @@ def _switched(result: Result, plan: Plan) -> Figure:
         use = slice(max(at - 500, 0), at + 1100)
         time = np.asarray((np.arange(len(t.y)) - at) * t.tick_s * 1e3, np.float64)
         series.append(Series(estimator, time[use], 1e6 * t.y[use]))
-    caption = "Position of the first repeat; judged is 50 to 100 ms after the switch."
+    caption = "Position of the first repeat as the sensor reads it; judged is 50 to 100 ms after the switch."
     return Figure("switch", "Compensation switched on", caption, "time (ms)", "position (µm)", tuple(series))
 
 

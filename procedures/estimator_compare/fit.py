@@ -43,6 +43,19 @@ def derivative(y: Array, tick_s: float) -> Array:
     return out
 
 
+def _quiet(expected: int, tick_s: float) -> int:
+    """Samples in which there is no switch and no load yet, of those before where it is expected.
+
+    Raises:
+        AnalysisError: there are none.
+    """
+    near = round(NEAR_S / tick_s)
+    if expected <= near:
+        raise AnalysisError(f"lead_s: found {expected * tick_s:g} s; expected more than the {NEAR_S:g} s before a switch or "
+                            "a load that are not judged")  # fmt: skip
+    return expected - near
+
+
 def switched_at(current: Array, y: Array, v: Array, disturbance: Array, expected: int, tick_s: float) -> int:
     """The sample from which the current holds the disturbance.
 
@@ -50,12 +63,12 @@ def switched_at(current: Array, y: Array, v: Array, disturbance: Array, expected
     it the estimated disturbance is in it too. Both are fitted where there is no doubt, and the sample parts the rest best.
 
     Raises:
-        AnalysisError: the disturbance never comes in.
+        AnalysisError: the disturbance never comes in, or there is nothing before it.
     """
-    near = round(NEAR_S / tick_s)
+    quiet, near = _quiet(expected, tick_s), round(NEAR_S / tick_s)
     a, b = y / np.abs(y).max(), v / np.abs(v).max()
     design = np.column_stack([np.ones(len(y)), a, b, a * a, a * b, a**3, a * a * b])
-    sure, late = slice(0, expected - near), slice(min(expected + round(LATE_S / tick_s), len(y) - near // 2), len(y))
+    sure, late = slice(0, quiet), slice(min(expected + round(LATE_S / tick_s), len(y) - near // 2), len(y))
     left = current - design @ np.linalg.lstsq(design[sure], current[sure], rcond=None)[0]
     share = float((left[late] @ disturbance[late]) / (disturbance[late] @ disturbance[late]))
     more = np.cumsum(left**2 - (left - share * disturbance) ** 2)  # by how much the second fits better so far
@@ -68,9 +81,9 @@ def moved_at(y: Array, expected: int, tick_s: float) -> int:
     """The sample from which a load is counted: EARLY_S before the position leaves what it was.
 
     Raises:
-        AnalysisError: it does not move.
+        AnalysisError: it does not move, or there is nothing before it.
     """
-    quiet = y[: expected - round(NEAR_S / tick_s)]
+    quiet = y[: _quiet(expected, tick_s)]
     far = np.flatnonzero(np.abs(y - quiet.mean()) > SURE * quiet.std())
     far = far[far >= len(quiet)]
     if not len(far):

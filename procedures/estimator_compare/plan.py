@@ -21,7 +21,7 @@ class Plan(BenchPlan):
     repeats: int = Field(10, ge=3)
     settle_s: float = Field(0.5, gt=0)  # with an estimator, before its compensation is switched on
     calm_s: float = Field(2.5, gt=0)  # with an estimator that compensates, before a load
-    lead_s: float = Field(0.3, ge=0.1)  # of a capture, before the switch or the load
+    lead_s: float = Field(0.3, ge=0.2)  # of a capture, before switch or load; its last 0.1 s are not judged
     engaged_s: float = Field(0.15, ge=0.11)  # of a capture, after the switch
     loaded_s: float = Field(1.05, ge=1.01)  # after the load
     spread_s: float = Field(0.6, ge=0)  # over which the moments are spread at random

@@ -41,14 +41,14 @@ DISTURBANCE = Quantity(
 AFTER = Quantity(
     "y_50_100",
     "m",
-    "RMS position 50 to 100 ms after the compensation was switched on",
+    "RMS position of the shaft 50 to 100 ms after the compensation was switched on",
     title="position after the switch",
 )
-PEAK = Quantity("peak", "m", "greatest deviation of the position after a load is hung")
-INTEGRAL = Quantity("integral", "m s", "integral over 1 s of the deviation's size after a load is hung")
-QUIET = Quantity("quiet", "m", "standard deviation of the position before the load")
+PEAK = Quantity("peak", "m", "greatest deviation of the shaft after a load is hung")
+INTEGRAL = Quantity("integral", "m s", "integral over 1 s of the size of the shaft's deviation after a load is hung")
+QUIET = Quantity("quiet", "m", "standard deviation of the shaft's position before the load, the sensor's noise in it")
 NOISE = Quantity(
-    "velocity_noise", "m/s", "RMS of the velocity above 100 Hz, where the body hardly moves, before the load"
+    "velocity_noise", "m/s", "RMS of the estimated velocity above 100 Hz, where the shaft hardly moves, before the load"
 )
 SINGLES = (VELOCITY, DISTURBANCE, AFTER, PEAK, INTEGRAL, QUIET, NOISE)
 RATIOS = tuple(
@@ -120,11 +120,13 @@ def _hang(rig: Rig, plan: Plan, record: Recorder, estimator: str, repeat: int, n
 def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     """Each quantity by estimator, and their ratios."""
     from procedures.estimator_compare import checks, estimates
+    from procedures.shared.certificates import certified_gain
 
     plan, taken, rig = recording.plan, read_taken(recording), recording.rig
     findings.gate(checks.of_signals(taken, plan))
     machine = conventions(rig)
-    result = estimates.evaluate(taken, plan, machine.known(rig, "harmonic_hz"))
+    gain = certified_gain(rig, machine.position)
+    result = estimates.evaluate(taken, plan, machine.known(rig, "harmonic_hz"), gain)
     findings.add(checks.of_weights(taken, _weights(rig, machine, taken[0].tick_s)))
     findings.add(checks.of_result(result, plan, predicted_ratio(rig, machine)))
     return result

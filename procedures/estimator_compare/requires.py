@@ -21,6 +21,7 @@ def requires(rig: RigFile) -> Requires:
     return Requires(
         roles=("levitation", "operator"),
         channels=(machine.position, STATUS),
+        sensors=(machine.position,),
         capabilities=(
             "settings.estimator",
             "settings.compensation",

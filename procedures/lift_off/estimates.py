@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.recording import Recording
+from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
 from procedures.lift_off import fit
 from procedures.lift_off.plan import Plan
@@ -21,16 +22,17 @@ from procedures.shared.gradients import by_inputs, linearised
 from procedures.shared.step_table import StepTable
 
 Array = npt.NDArray[np.float64]
-EARLY_N, EARLY_HALF_N = (0.033, 0.27), (0.015, 0.15)
-"""An end goes by so much force early, within so much more, the second number times sin^2 of how far the force is turned: the
-loop that holds x answers the noise of its probe, which lifts by that sine; a push of a few milliseconds is enough where the
-ring hardly carries; and the ramp goes on meanwhile."""
+EARLY_HALF = (0.02, 0.2)
+"""How early an end goes is known within so many N and so much of itself (`fit.early`): its residues, and masses, gains and
+stiffnesses of another machine."""
 ASIDE_N = 0.015  # by how much that differs between the signs of gamma
 RIPPLE = 0.025  # of the force constants (T 5.25), over the rotor's angle
-COUNT_RAD = math.pi / 4096 / 2  # where the rotor stands within its encoder's count: half of what it may be off
+WITHIN = 1 / 4  # of a count: where the rotor stands within it, half of what it may be off
 AWAY_N = (
     0.03  # what the statics leave out: a side pull, 0.04 N/A^2 (T Table 5.3) 5 A times what segments differ by, 0.15 A
 )
+LEAST_N_RAD = 10.0  # 0.2 N/deg: a force that grows by less with gamma tells no angle; the interval is wide then
+PRESSED_N = 1.5  # of the stator's pull, at most: at rest over 100 N press the end into its ring, up to 4 um deeper
 WRITE_S = 0.005  # within which a write of gamma acts: a request and its reply
 
 
@@ -38,7 +40,7 @@ WRITE_S = 0.005  # within which a write of gamma acts: a request and its reply
 class Analysis:
     """`gammas` (N, 2) rad of the lifts below and above, by repeat; `estimates` by quantity, `zero_predicted` rad, `surplus` N,
     `carried` A and by how much that is `more` than in force-coupling beside them; `lifted` are indices into the ramps' samples,
-    None where the end stayed down. `limit_A` is what i_y took on the ring."""
+    None where the end stayed down. `limit_A` is what i_y took on the ring, `newtons_A` the y winding's constant N/A."""
 
     rest: StepTable[Rest]
     dwells: StepTable[Dwell] | None
@@ -48,6 +50,20 @@ class Analysis:
     gammas: Array
     estimates: dict[str, Estimate]
     limit_A: float
+    newtons_A: float
+
+
+@dataclass(frozen=True)
+class Statics:
+    """The values of the inputs; `load` (L_x, L_y) N that the motor has to give, and i_y at its limit, A."""
+
+    values: Mapping[str, float]
+    load: tuple[float, float]
+    limit_A: float
+
+    def turned(self, gammas: Array) -> float:
+        """By which gamma the force is turned, from the commutation's zero, in the mean of lifts below and above, rad."""
+        return float(gammas[:, 1].mean() - gammas[:, 0].mean()) / 2 + self.values["gamma_0"]
 
 
 def evaluate(recording: Recording[Plan], rest: StepTable[Rest]) -> Analysis:
@@ -59,37 +75,40 @@ def evaluate(recording: Recording[Plan], rest: StepTable[Rest]) -> Analysis:
     lifted = [_leaves(r, depth, plan) for r in ramps]
     gammas = _paired(ramps, lifted)
     inputs = fit_inputs(recording)
-    low = _lowest(
-        machine, rest, dwells, held, [r.before(k) for r, k in zip(ramps, lifted, strict=True) if k is not None]
-    )
+    before = [r.before(k) for r, k in zip(ramps, lifted, strict=True) if k is not None]
+    low = _lowest(recording.rig, rest, dwells, held, before)
     found = {} if dwells is None else {"rest_depth": _depth(low["yo"], inputs["gain_yo"])}
-    limit, slope = math.nan, math.nan
+    limit = math.nan
     if held is not None:
-        predicted, limit, slope = _predicted(machine, low, dwells, held, inputs)
+        predicted, statics = _predicted(machine, low, dwells, held, inputs, lifts=len(gammas) > 0)
         found |= predicted | _carried(recording, machine, held, inputs)
-    if len(gammas):
-        values = {name: e.value for name, e in inputs.items()}
-        turned = float(gammas[:, 1].mean() - gammas[:, 0].mean()) / 2 + values["gamma_0"]
-        force = math.sin(values["pole_pairs"] * (turned - values["gamma_0"])) ** 2
-        ripple = [fit.ripple(values, limit, turned, off, RIPPLE) for off in _off(ramps, lifted)]
-        found |= _angles(gammas, slope, force, (ripple[0], ripple[1]), plan)
-    return Analysis(rest, dwells, held, ramps, lifted, gammas, found, limit)
+        limit = statics.limit_A
+        if len(gammas):
+            found |= _angles(gammas, statics, ramps, lifted, plan)
+    newtons_A = fit.constants({name: e.value for name, e in inputs.items()})[0]
+    return Analysis(rest, dwells, held, ramps, lifted, gammas, found, limit, newtons_A)
 
 
 def _lowest(
-    machine: Servomotor, rest: StepTable[Rest], dwells: StepTable[Dwell] | None, held: StepTable[Held] | None,
+    rig: RigFile, rest: StepTable[Rest], dwells: StepTable[Dwell] | None, held: StepTable[Held] | None,
     before: Sequence[Mapping[str, float]],
 ) -> dict[str, Array]:  # fmt: skip
     """Readings (n,) m by axis of the shaft with its outboard end on the ring: just before each lift, where the ring carries
-    nothing and is not pressed; without a lift by gamma, on the loaded ring; with a lift at once, at rest, where of the other
-    probes what they read with the end up is taken."""
+    nothing and is not pressed; without a lift by gamma, on the loaded ring. With a lift at once it was never seen so: the depth
+    is that at rest, beneath where it may lie aside; sideways the end stands as when it is up; and the inboard loop holds the
+    plane of its actuators, not of its probes, about which the inboard reading goes as a lever."""
+    machine = conventions(rig)
     if before:
         return {axis: np.array([b[axis] for b in before]) for axis in machine.positions}
     if dwells is not None:
         return {axis: dwells.mean[channel] for axis, channel in machine.positions.items()}
     up, (x, y) = rest if held is None else held, machine.positions_of("xo", "yo")
-    deep = {"yo": -np.hypot(rest.mean[x], rest.mean[y])}  # at rest it may lie beside the lowest place of its ring
-    return {axis: deep.get(axis, up.mean[channel]) for axis, channel in machine.positions.items()}
+    low = {axis: up.mean[channel] for axis, channel in machine.positions.items()}
+    depth, g = -np.hypot(rest.mean[x], rest.mean[y]), {name: q.value for name, q in rig.geometry.items()}
+    lever = (g["com_to_inboard_sensor"] - g["com_to_inboard_amb"]) / (
+        g["com_to_inboard_amb"] + g["com_to_outboard_sensor"]
+    )
+    return {**low, "yo": depth, "yi": low["yi"] - lever * (depth - low["yo"])}
 
 
 def _leaves(r: Ramped, depth: Mapping[Dwell, float], plan: Plan) -> int | None:
@@ -114,29 +133,51 @@ def _depth(reading: Array, gain: Estimate) -> Estimate:
     return Estimate(float(-reading.mean()), "m", {scatter: 1.0} if u else {}) / gain
 
 
-def _off(ramps: Sequence[Ramped], lifted: Sequence[int | None]) -> tuple[float, float]:
+def _off(ramps: Sequence[Ramped], lifted: Sequence[int | None], count_rad: float) -> tuple[float, float]:
     """How far the rotor stands off its home angle when the end goes, rad: what differs between the signs of gamma, which is in
     half the difference of the angles, and what both share, which is in their middle."""
     done = [(r.labels.way, r.turned(k)) for r, k in zip(ramps, lifted, strict=True) if k is not None]
     below, above = (float(np.mean([angle for way, angle in done if way == wanted])) for wanted in (-1, 1))
-    return abs(above - below) / 2 + COUNT_RAD, abs(above + below) / 2 + COUNT_RAD
+    return abs(above - below) / 2 + WITHIN * count_rad, abs(above + below) / 2 + WITHIN * count_rad
+
+
+def _early(
+    gammas: Array, statics: Statics, ramps: Sequence[Ramped], lifted: Sequence[int | None], plan: Plan
+) -> tuple[Estimate, Estimate, tuple[float, float]]:
+    """By how much gamma has to be turned further than where the end went, below and above, rad, and how fast the force grows
+    there, N/rad. The growth is taken where the end was seen to go, whatever was predicted."""
+    p, found = statics.values, []
+    for column, way in enumerate((-1, 1)):
+        gamma = float(gammas[:, column].mean())
+        shaken = [r.shaken(k) for r, k in zip(ramps, lifted, strict=True) if k is not None and r.labels.way == way]
+        first, second = fit.growth(p, *statics.load, statics.limit_A, gamma, way)
+        rate = max(fit.further(first, second, fit.NEAR_N)[1], LEAST_N_RAD) * plan.rate_rad_s
+        early = fit.early(p, math.sqrt(float(np.mean(np.square(shaken)))), gamma, rate)
+        further, slope = fit.further(first, second, early)
+        found.append((early, further, max(slope, LEAST_N_RAD)))
+    early = (found[0][0] + found[1][0]) / 2
+    influence = _bound("lift/early", "motion at the threshold", EARLY_HALF[0] + EARLY_HALF[1] * early, "N")
+    below, above = (Estimate(further, "rad", {influence: 1 / slope}) for _, further, slope in found)
+    return below, above, (found[0][2], found[1][2])
 
 
 def _angles(
-    gammas: Array, slope: float, square: float, ripple_N: tuple[float, float], plan: Plan
+    gammas: Array, statics: Statics, ramps: Sequence[Ramped], lifted: Sequence[int | None], plan: Plan
 ) -> dict[str, Estimate]:  # fmt: skip
-    """Half difference and mean of both angles, each from what the repeats gave; `slope` N/rad, `square` sin^2 of how far the
-    force is turned, `ripple_N` in each."""
+    """Half difference and mean of both angles, each from what the repeats gave."""
     out = {}
-    at, half = (one[0] + one[1] * square for one in (EARLY_N, EARLY_HALF_N))
-    early = Estimate.of(at, _bound("lift/early", "motion at the threshold", half, "N"))
-    early = early + Estimate.of(0.0, _product("lift/ripple", ripple_N[0]))
+    below, above, slopes = _early(gammas, statics, ramps, lifted, plan)
+    by_N = (1 / slopes[0] + 1 / slopes[1]) / 2
+    ripple = [
+        Estimate.of(0.0, _product(name, fit.ripple(statics.values, statics.limit_A, statics.turned(gammas), off, RIPPLE)))
+        for name, off in zip(("lift/ripple", "lift/ripple-aside"), _off(ramps, lifted, math.tau / plan.encoder_counts),
+                             strict=True)
+    ]  # fmt: skip
     aside = Estimate.of(0.0, _bound("lift/aside", "motion at the threshold, one way", ASIDE_N, "N"))
-    aside = aside + Estimate.of(0.0, _product("lift/ripple-aside", ripple_N[1]))
     late = Estimate.of(0.0, _bound("lift/write", "when gamma begins to turn", WRITE_S * plan.rate_rad_s, "rad"))
     ways: tuple[tuple[str, Array, Estimate], ...] = (
-        ("gamma_lift", (gammas[:, 1] - gammas[:, 0]) / 2, early * (1 / slope) + late if slope > 0 else late),
-        ("gamma_zero", gammas.mean(axis=1), aside * (1 / slope) if slope > 0 else Estimate.exact(0.0)),
+        ("gamma_lift", (gammas[:, 1] - gammas[:, 0]) / 2, (above + below) * 0.5 + ripple[0] * by_N + late),
+        ("gamma_zero", gammas.mean(axis=1), (above - below) * 0.5 + (aside + ripple[1]) * by_N),
     )
     for name, values, more in ways:
         u = float(np.std(values, ddof=1)) / math.sqrt(len(values)) if len(values) > 1 else 0.0
@@ -160,10 +201,11 @@ def _bound(identity: str, name: str, half: float, unit: str) -> Influence:
 
 def _predicted(
     machine: Servomotor, low: Mapping[str, Array], dwells: StepTable[Dwell] | None, held: StepTable[Held],
-    inputs: dict[str, Estimate],
-) -> tuple[dict[str, Estimate], float, float]:  # fmt: skip
+    inputs: dict[str, Estimate], lifts: bool,
+) -> tuple[dict[str, Estimate], Statics]:  # fmt: skip
     """`gamma_predicted` and `zero_predicted` rad, where there are any, and `surplus` N, the motor's force at gamma = 0 beyond
-    what lifts the end; i_y at its limit A; and the growth of the force with gamma N/rad where it lifts."""
+    what lifts the end. Where it should lift at once and `lifts` by gamma, `gamma_predicted` is 0: what is seen contradicts
+    that, or there are angles within its interval. An end that was never seen on its ring with the other one up has none."""
     below = {axis: float(x.mean()) for axis, x in low.items()}
     above = {axis: float(held.mean[channel].mean()) for axis, channel in machine.positions.items()}
     carrying = held.stack(machine.segments).mean(axis=1)
@@ -186,9 +228,15 @@ def _predicted(
     found = by_inputs(model, inputs)
     away = {name: Estimate.of(0.0, _bound(f"statics/{name}", "side pull", AWAY_N, "N")) for name in found}
     told = {"surplus": _in("N", found["surplus"] + away["surplus"])}
+    if dwells is None:
+        half = PRESSED_N / 2
+        pressed = Estimate.of(half, _bound("statics/pressed", "ring pressed at rest", half, "N"))
+        return {"surplus": _in("N", told["surplus"] + pressed)}, Statics(values, load(values), limit(values))
     if slope > 0:  # else it lifts at once, and there is no angle
         told |= {name: _in("rad", found[name] + away[name] * (1 / slope)) for name in found if name != "surplus"}
-    return told, limit(values), slope
+    elif lifts and slope == 0:
+        told["gamma_predicted"] = _in("rad", found["gamma_predicted"])
+    return told, Statics(values, load(values), limit(values))
 
 
 def _carried(

@@ -28,5 +28,6 @@ class Plan(BenchPlan):
     limit_share: float = Field(
         0.999, gt=0, lt=1
     )  # of its limit that i_y takes at least on the ring, and as much above at most
-    max_angle_rad: float = Field(6e-3, gt=0)  # by which the rotor may be off its home angle: four counts of the encoder
+    max_angle_rad: float = Field(6e-3, gt=0)  # by which the rotor may be off its home angle; four counts at least
+    encoder_counts: int = Field(4096, gt=0)  # per turn
     max_lost: float = Field(1e-3, ge=0)  # share of a step's samples

@@ -22,6 +22,7 @@ from bench.procedure.states import transition
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
+from bench.uncertainty import interval
 from procedures.lift_off.plan import Plan
 from procedures.lift_off.requires import requires
 from procedures.lift_off.steps import Dwell, Held, Ramp, Rest, always, read_table
@@ -168,8 +169,12 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
 def measured(a: Analysis) -> Iterator[Measured]:
     """The quantities, as far as the run went."""
     for quantity in MEASURES:
-        if quantity.name in a.estimates:
-            yield quantity.measured(a.estimates[quantity.name])
+        e = a.estimates.get(quantity.name)
+        if e is None or (
+            quantity is PREDICTED and interval(e).high <= 0
+        ):  # it lifts at 0 for certain: that is no angle
+            continue
+        yield quantity.measured(e)
 
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:

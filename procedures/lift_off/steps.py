@@ -20,6 +20,8 @@ from procedures.shared.step_table import Kind, Labels, StepTable, tabulate
 
 Array = npt.NDArray[np.float64]
 LAST = 100  # samples just before a lift
+FEWEST = 16  # of which a scatter is told
+SHAKEN_S = 1.0  # before a lift, over which i_x is watched
 BEFORE_S = (0.2, 0.06)  # before a lift: at 0.2 deg/s the ring carries 0.5 N still, and is pressed by some 10 nm
 
 
@@ -85,6 +87,17 @@ class Ramped:
     def turned(self, lifted: int) -> float:
         """How far the rotor is off its home angle just before the lift, rad, as its encoder reads."""
         return float(self.angle[max(0, lifted - LAST) : lifted].mean())
+
+    def shaken(self, lifted: int) -> float:
+        """Scatter of i_x before the lift, A, about the parabola by which it goes with gamma; 0 of too few samples."""
+        last = min(lifted, max(int(np.searchsorted(self.t, self.t[lifted] - BEFORE_S[1])), FEWEST))
+        use = slice(int(np.searchsorted(self.t, self.t[last] - SHAKEN_S)), last)
+        t, i = self.t[use], self.i_x[use]
+        if len(t) < FEWEST:
+            return 0.0
+        about = (t - t.mean()) / SHAKEN_S
+        left = i - np.polyval(np.polyfit(about, i, 2), about)
+        return float(np.sqrt((left**2).sum() / (len(t) - 3)))
 
     def before(self, lifted: int, early_s: tuple[float, float] = BEFORE_S) -> dict[str, float]:
         """Mean readings by axis from so long until so long before the sample of the lift: the ring carries hardly anything

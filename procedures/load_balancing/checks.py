@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from bench.findings import Effect, Finding
+from bench.recording import Recording
 from bench.uncertainty import Estimate, coverage_factor
 from procedures.load_balancing import fit, inputs
 from procedures.load_balancing.estimates import Result, Turns, loads_of
@@ -17,16 +19,21 @@ from procedures.load_balancing.steps import (
     BEFORE,
     FACTS_SEEN,
     LOADS_SEEN,
+    STEP,
     Around,
     Complex,
+    bins,
     mean_currents,
     of_way,
+    place,
 )
 from procedures.servomotor import checks
 from procedures.servomotor.conventions import Servomotor
+from procedures.shared import signals
 from procedures.shared.gradients import linearised
 
 FATAL = ("stuck-channel", "missing-turns")
+HALF = 0.5  # of a step's samples
 ALLOWED = 0.002  # of the reduction: what slew, delay and observer add to a quasi-static formula, see the page
 SIDE_N = 3.0  # of constant horizontal load that decides the side; what the observer's noise may add is a sixth of it
 CHANGED = 0.01  # of the turn, and of |i_x| in the mean: readings near zero have either sign
@@ -36,21 +43,41 @@ SIZE, TURNED_RAD = 0.003, math.radians(0.2)  # of the load's change: what the to
 OFF_RAD = math.radians(0.06)  # of the phase angle, beside its U: slew and delay
 
 
+def of_losses(recording: Recording[Plan]) -> Iterator[Finding]:
+    """Samples that steps have lost, before anything is made of the others. More than half of a step are no turns any more."""
+    steps, allowed = list(recording.steps(STEP)), recording.plan.max_lost
+    if not steps:
+        return
+    lost, expected = np.array([(s.lost(), s.expected()) for s in steps], dtype=float).T
+
+    def where(share: fit.Array) -> str:
+        labels = steps[int(np.argmax(share))].labels
+        return place(str(labels["when"]), str(labels["way"]), int(labels["repeat"]))
+
+    gone = (lost > HALF * expected).any()
+    for found in signals.losses(lost, expected, allowed, where):
+        yield replace(found, effect=Effect.ERROR) if gone else found
+
+
+def of_parts(around: Sequence[Around], plan: Plan) -> Iterator[Finding]:
+    """Parts of the circle that no turn of a step has a sample of."""
+    worst = max(around, key=lambda a: a.unheld)
+    if worst.unheld:
+        yield Finding(
+            "missing-samples",
+            f"{worst.unheld} of the {bins(plan)} parts of the circle hold no sample in any of a step's {plan.turns} turns. "
+            f"Give a larger bin_s (found {plan.bin_s:g} s) or more turns, or look at the link: load, cable, gateway.",
+            worst.where, Effect.ERROR,
+        )  # fmt: skip
+
+
 def of_signals(around: Sequence[Around], machine: Servomotor, plan: Plan) -> Iterator[Finding]:
-    """Turns that are missing, lost samples, stuck channels, limits and contact."""
+    """Turns that are missing, stuck channels, limits and contact."""
     for way, _ in plan.signs:
         for when in (BEFORE, AFTER):
             if len(found := of_way(around, way, when)) < plan.repeats:
                 text = f"found {len(found)} repeats {way}, {when}; expected {plan.repeats} (was the run stopped early?)"
                 yield Finding("missing-turns", text, way, Effect.ERROR)
-    worst = max(around, key=lambda a: a.lost / max(a.expected, 1))
-    share = worst.lost / max(worst.expected, 1)
-    if share > plan.max_lost:
-        yield Finding(
-            "missing-samples",
-            f"{share:.2%} of the samples of a step are missing ({plan.max_lost:.2%} is allowed). Look at the link: load, "
-            "cable, gateway.", worst.where, Effect.INDETERMINATE,
-        )  # fmt: skip
     for channel in sorted({c for a in around for c in a.stuck}):
         yield Finding(
             "stuck-channel", f"{channel} does not move at all; a live sensor has noise.", channel, Effect.ERROR

@@ -112,15 +112,17 @@ def _followed(goal: Array, law: Law) -> Array:
 
 
 def peak(x: Array, at: int | None = None) -> float:
-    """Greatest of values (bins,) around a circle, by a parabola through those near it: the largest of many noisy values is too
-    large, by sigma sqrt(2 ln n); a parabola through m of them is so by some millionth. `at`: where it is."""
+    """Greatest of what (bins,) are means of around a circle, by a parabola through those near it: the largest of many noisy
+    values is too large, by sigma sqrt(2 ln n); a parabola through m of them is so by some millionth. The mean over a bin at the
+    top is lower than the top by a twelfth of the second coefficient, 7 parts in 100 000 with the widest bins. `at`: where it
+    is."""
     k = int(np.argmax(x)) if at is None else at
     reach = max(round(NEAR * len(x)), 2)
     s = np.arange(-reach, reach + 1)
     c2, c1, c0 = np.polyfit(s, np.take(x, k + s, mode="wrap"), 2)
     if c2 >= 0 or abs(c1) > -2 * c2 * reach:  # a corner: there is no smooth top
         return float(x[k])
-    return float(c0 - c1**2 / (4 * c2))
+    return float(c0 - c1**2 / (4 * c2) - c2 / 12)
 
 
 def smooth(x: Array) -> Array:

@@ -1,8 +1,9 @@
 """Active load balancing of the motor on a circle (thesis 6.7.3): the field is turned so that i_x and i_y carry alike.
 
-Measurands, each way round: the largest |i_y| without and with balancing (true, means over 10 ms of the circle's phase and over
-the turns) and by how much it falls; the largest current of either axis; how unlike they are; the greatest phase angle; the
-path's deviation. Beside them what the quasi-static formula predicts of the recorded loads and of the adopted constants.
+Measurands, each way round: the largest |i_y| without and with balancing (true, by means over `bin_s` of the circle's phase
+and over the turns) and by how much it falls; the largest current of either axis; how unlike they are; the greatest phase
+angle; the path's deviation. Beside them what the quasi-static formula predicts of the recorded loads and of the adopted
+constants.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
-from bench.calibration import Need
+from bench.calibration import Calibration, Need
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
@@ -21,7 +22,7 @@ from bench.procedure.states import transition
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from procedures.load_balancing import estimates, inputs
+from procedures.load_balancing import estimates, foresight, inputs
 from procedures.load_balancing.estimates import Result
 from procedures.load_balancing.plan import Plan
 from procedures.load_balancing.requires import requires
@@ -136,7 +137,9 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
 
     findings.gate([*of_probe(recording), *segments.of_nudges(recording)])
     plan, rig = recording.plan, recording.rig
+    findings.gate(checks.of_losses(recording))
     around = read_around(recording)
+    findings.gate(checks.of_parts(around, plan))
     findings.gate(checks.of_signals(around, conventions(rig), plan), checks.FATAL)
     results, given = estimates.evaluate(recording, around)
     model = inputs.told(rig, plan, recording.calibrations)
@@ -160,7 +163,7 @@ def measured(a: Analysis) -> Iterator[Measured]:
 
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
-    """What cannot work before anything starts: what envelope, currents or torque do not allow."""
+    """What cannot work before anything starts: what envelope or torque do not allow, and parts of a turn that show no peak."""
     if len(set(plan.ways)) < len(plan.ways):
         yield f"ways: found {', '.join(plan.ways)}; expected each once"
     room = carrying.MARGIN * rig.envelope.max_levitated_position_m
@@ -170,12 +173,7 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     ):
         if plan.radius_m > limit:
             yield f"radius_m: found {plan.radius_m * 1e6:.0f} µm; {what} allows {limit * 1e6:.0f} µm"  # fmt: skip
-    g = rig.geometry
-    share = conventions(rig).sensor_share(g["com_to_motor"].value, rig)
-    current = (carrying.gravity_share_N(rig) + g["motor_stiffness"].value * share * plan.radius_m) / carrying.ALPHA_D
-    most = carrying.MARGIN * stated(rig, "motor.segment_limit").default
-    if current > most:
-        yield f"radius_m: the motor would need {current:.1f} A at the bottom of the circle; expected at most {most:.1f} A"
+    yield from foresight.parts(plan, RATE_HZ)
     yield from _phase(rig, plan)
 
 
@@ -193,6 +191,11 @@ def _phase(rig: RigFile, plan: Plan) -> Iterator[str]:
             f"{math.degrees(REVERSED / poles):.2f}° it has none, and beyond it turns the rotor the other way. Expected at most "
             f"{math.degrees(allowed):.2f}°, or beyond_torque=true where that is meant"
         )
+
+
+def foresees(rig: RigFile, plan: Plan, facts: Mapping[str, Calibration]) -> Iterable[str]:
+    """A current that the motor has not, by the adopted constants."""
+    return foresight.current(rig, plan, facts)
 
 
 def figures(a: Analysis, recording: Recording[Plan]) -> Iterable[Figure]:
@@ -214,6 +217,7 @@ procedure = Procedure(
     figures=figures,
     requires=requires,
     check=check,
+    foresees=foresees,
     settings=settings,
     step_count=step_count,
     needs=needs,

@@ -34,7 +34,7 @@ def requires(rig: RigFile) -> Requires:
         channels=(*channels(machine), *wiring.channels(machine)),
         sensors=(*machine.segments, *positions(machine)),
         parameters=needed(rig, *hold.NEEDED, *wiring.NEEDED, *NEEDED),
-        geometry=(*inputs.LENGTHS.values(), "motor_stiffness"),
+        geometry=tuple(inputs.LENGTHS.values()),
         machine=("pole_pairs",),
         capture=(PHASE, *LOADS),
         capabilities=(

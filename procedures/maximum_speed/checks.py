@@ -15,7 +15,7 @@ from bench.recording import Recording
 from bench.uncertainty import Estimate, interval
 from bench.units import RPM
 from procedures.maximum_speed.estimates import Result
-from procedures.maximum_speed.plan import HALF, OP, Plan
+from procedures.maximum_speed.plan import NAMES, WORDS, Plan
 from procedures.maximum_speed.steps import CARRIED_A, GUARDED, NOT_CARRIED, SET_POINT, UNSTEADY, Window
 from procedures.servomotor.checks import idle
 from procedures.servomotor.conventions import Servomotor
@@ -40,11 +40,11 @@ def of_events(recording: Recording[Plan]) -> Iterator[Finding]:
         yield Finding(
             "guarded",
             f"the rotor reached {abs(event['guard']):.1f} rad/s, the speed reference that guards the run: what ends there is "
-            "no maximum speed. Give a lower limit_A.", f"{event['sharing']}", Effect.ERROR,
+            "no maximum speed. Give a lower limit_A.", WORDS[event["sharing"]], Effect.ERROR,
         )  # fmt: skip
     for event in recording.events(UNSTEADY):
         text = f"the speed still changes by {event['change']:.2%} from one second to the next after {event['waited']:.0f} s."
-        yield Finding("unsteady", text, f"{event['sharing']}", Effect.INDETERMINATE)
+        yield Finding("unsteady", text, WORDS[event["sharing"]], Effect.INDETERMINATE)
     wanted = recording.plan.carried_A
     for event in recording.events(SET_POINT):
         if wanted and event["i_y"] > wanted + CARRIED_A:
@@ -93,8 +93,8 @@ def _sharing(windows: Sequence[Window]) -> Iterator[Finding]:
         if abs(told - asked) > max(SAME_SHARE, abs(told - other)):
             yield Finding(
                 "sharing-not-switched",
-                f"lambda is {told:.3f} where {w.sharing} makes {asked:.3f} of i_x and i_y: the segments are not shared as was "
-                "asked.", w.where, Effect.INDETERMINATE,
+                f"λ is {told:.3f} where {WORDS[w.sharing]} makes {asked:.3f} of i_x and i_y: the segments are not "
+                "shared as was asked.", w.where, Effect.INDETERMINATE,
             )  # fmt: skip
             return
 
@@ -135,7 +135,7 @@ def of_lag(result: Result, plan: Plan) -> Iterator[Finding]:
             f"the currents lie {math.degrees(lag):.1f}° of the electrical turn behind the field at "
             f"{result.of[where].speed:.0f} rad/s, {math.degrees(LATE_RAD):.1f}° are allowed: their lag is not compensated, or "
             "not by the right time.",
-            where, Effect.INDETERMINATE,
+            WORDS[where], Effect.INDETERMINATE,
         )  # fmt: skip
 
 
@@ -152,7 +152,7 @@ def of_result(result: Result, plan: Plan) -> Iterator[Finding]:
     for name, e in _one_way(result).items():
         if abs(e) > CONSTANT_N_m:
             text = f"{e * 1e3:+.0f} mN m drive the rotor forward whichever way it turns ({CONSTANT_N_m * 1e3:g} mN m allowed)."
-            yield Finding("direction-dependent", text, name, Effect.INDETERMINATE)
+            yield Finding("direction-dependent", text, WORDS[name], Effect.INDETERMINATE)
 
 
 def _contradictions(result: Result) -> Iterator[Finding]:
@@ -165,7 +165,7 @@ def _contradictions(result: Result) -> Iterator[Finding]:
             f"({far:.1f} U apart): the torque of the pairs of segments differs by more than their tolerance, a sensor of "
             "their currents is wrong, or the drag is not viscous.", "ratio", Effect.INDETERMINATE,
         )  # fmt: skip
-    for name in ("half", "op"):
+    for s, name in NAMES.items():
         apart = e[f"apart_{name}"]
         if (far := _beyond(apart)) > SURE:
             share = apart.value / e[f"predicted_{name}"].value
@@ -173,7 +173,7 @@ def _contradictions(result: Result) -> Iterator[Finding]:
                 "speed-contradicts",
                 f"{e[f'speed_{name}'].value * RPM:.1f} r/min are {share:+.1%} off what torque constant and drag make of the "
                 f"torque current ({far:.1f} U): B, T_c or alpha_tau are not those of this state any more (bias, temperature, "
-                "a brake), or the encoder's zero has moved.", name, Effect.INDETERMINATE,
+                "a brake), or the encoder's zero has moved.", WORDS[s], Effect.INDETERMINATE,
             )  # fmt: skip
     if (far := _beyond(e["slope_apart"])) > SURE:
         text = (f"torque over speed rises by {e['torque_slope'].value:.4f} N m s/rad from one run to the other, the spindown's "
@@ -189,11 +189,11 @@ def _beyond(apart: Estimate) -> float:
 
 def _agreement(result: Result) -> Finding:
     e, said = result.estimates, []
-    for s, name in ((HALF, "half"), (OP, "op")):
+    for s, name in NAMES.items():
         apart = e[f"apart_{name}"]
         said.append(
-            f"{s}: {e[f'speed_{name}'].value * RPM:.1f} r/min, {apart.value / e[f'predicted_{name}'].value:+.2%} off what "
-            f"the facts expect ({_beyond(apart):.2f} U)"
+            f"{WORDS[s]}: {e[f'speed_{name}'].value * RPM:.1f} r/min, {apart.value / e[f'predicted_{name}'].value:+.2%} off "
+            f"what the facts expect ({_beyond(apart):.2f} U)"
         )
     return Finding("speeds-as-expected", "; ".join(said) + ".", "")
 

@@ -23,7 +23,7 @@ from bench.rigfile import RigFile
 from bench.rigfile.toleranced import Toleranced
 from bench.uncertainty import Estimate, Influence, propagate
 from procedures.maximum_speed import fit
-from procedures.maximum_speed.plan import HALF, OP, SHARINGS, Plan
+from procedures.maximum_speed.plan import NAMES, SHARINGS, WORDS, Plan
 from procedures.maximum_speed.steps import Window, by_sharing
 from procedures.servomotor.conventions import conventions
 from procedures.shared.certificates import certified, certified_sensors
@@ -79,7 +79,7 @@ def gathered(windows: list[Window], sharing: str, counts: int) -> Shared:
     """
     ways = {d: by_sharing(windows, sharing, d) for d in (1, -1)}
     if min(len(found) for found in ways.values()) < 2:
-        raise AnalysisError(f"{sharing}: found fewer than two runs in a direction (was the run stopped early?)")
+        raise AnalysisError(f"{WORDS[sharing]}: found fewer than two runs in a direction (was the run stopped early?)")
     rows = {d: np.array([[w.speed, d * w.segments.mean(), w.told.bound] for w in found]) for d, found in ways.items()}
     seen = {WAYS[d]: r - r.mean(axis=0) for d, r in rows.items()}
     means = {d: np.mean([w.segments for w in found], axis=0) for d, found in ways.items()}
@@ -146,7 +146,7 @@ class _Model:
         weights = gains / gains.mean() / np.array([p[f"gain_m{k}"] for k in range(4)])
         out: dict[str, float] = {"drag": drag, "constant": constant, "per_A": per_A}
         current, speed, bound = {}, {}, {}
-        for s, name in ((HALF, "half"), (OP, "op")):
+        for s, name in NAMES.items():
             speed[name] = self.of[s].speed + p[f"speed_{s}"]
             current[name] = float(weights @ self.of[s].currents) / 4 + p[f"current_{s}"]
             bound[name] = self.of[s].bound + p[f"bound_{s}"]
@@ -204,7 +204,8 @@ def scatter(sharing: str, of: Mapping[str, Array]) -> dict[str, Estimate]:
         root = np.linalg.cholesky(covariance / np.outer(scale, scale) + 1e-9 * np.eye(SEEN)) * scale[:, None]
         for k in range(SEEN):
             part = Influence(
-                id=f"scatter/{sharing}/{way}/{k + 1}", name=f"scatter of the runs, {sharing}, {way} ({k + 1})", u=1.0, unit="1",
+                id=f"scatter/{sharing}/{way}/{k + 1}", name=f"scatter of the runs, {WORDS[sharing]}, {way} ({k + 1})",
+                u=1.0, unit="1",
                 kind="A", distribution="normal", dof=float(n - 1), source=f"{n} runs",
             )  # fmt: skip
             for row in range(k, SEEN):
@@ -215,7 +216,7 @@ def scatter(sharing: str, of: Mapping[str, Array]) -> dict[str, Estimate]:
 def _ripples(of: Mapping[str, Shared]) -> dict[str, Estimate]:
     """The speed's ripple by sharing, mean of both directions."""
     out = {}
-    for s, name in ((HALF, "half"), (OP, "op")):
+    for s, name in NAMES.items():
         total = Estimate.exact(0.0, "rad/s")
         for d, way in WAYS.items():
             found = fit.ripple(np.array([w.swings for w in of[s].windows if w.direction == d]))

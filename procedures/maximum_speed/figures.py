@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 import numpy.typing as npt
@@ -15,14 +15,12 @@ from bench.uncertainty import interval
 from bench.units import RPM
 from procedures.maximum_speed import fit
 from procedures.maximum_speed.estimates import Result
-from procedures.maximum_speed.plan import HALF, OP, Plan
+from procedures.maximum_speed.plan import HALF, NAMES, OP, WORDS, Plan
 from procedures.maximum_speed.requires import DEMANDS
 from procedures.maximum_speed.steps import RUN, SHARED
 from procedures.servomotor.conventions import conventions
 
 Array = npt.NDArray[np.float64]
-WORDS: Mapping[str, str] = {HALF: "λ = 1/2", OP: "λ by (6.24)"}
-NAMES: Mapping[str, str] = {HALF: "half", OP: "op"}
 SHOWN = 4  # changes of the sharing: to a half from rest, by (6.24), the same again, a half
 LEAST_S, CONSTANTS = 1.5, 8.0  # how long each is shown, in s and in J/B
 MEAN_S = 0.02  # of the curves over time

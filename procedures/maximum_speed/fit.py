@@ -68,7 +68,8 @@ def turning(t: Array, angle: Array) -> Turning:
     turns = int(turned[-1] / (2 * math.pi))
     if turns < FEWEST_TURNS:
         raise AnalysisError(
-            f"window: the rotor turns {turned[-1] / (2 * math.pi):.2f} times; expected {FEWEST_TURNS} or more"
+            f"window: the rotor turns {turned[-1] / (2 * math.pi):.2f} times; expected {FEWEST_TURNS} or more. "
+            "Give a longer average_s"
         )
     last = int(np.searchsorted(turned, 2 * math.pi * turns))
     x, time = unwrapped[:last], t[:last] - t[0]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Literal
 
 from pydantic import Field
@@ -11,6 +12,9 @@ from bench.procedure import BenchPlan
 HALF, OP = "half", "priority"
 SHARINGS = (HALF, OP)
 """How the segments share force and torque, by the settings of the controller: lambda a half, and by T (6.24)."""
+WORDS: Mapping[str, str] = {HALF: "λ = 1/2", OP: "λ by (6.24)"}
+NAMES: Mapping[str, str] = {HALF: "half", OP: "op"}
+"""What they are called to the reader, and in the names of the quantities."""
 
 
 class Plan(BenchPlan):

@@ -20,11 +20,11 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from procedures.maximum_speed import foresight
-from procedures.maximum_speed.plan import OP, SHARINGS, Plan
+from procedures.maximum_speed.plan import NAMES, OP, SHARINGS, WORDS, Plan
 from procedures.maximum_speed.requires import requires
 from procedures.maximum_speed.running import carry_so_much, guard_of, limit_of, run_all
-from procedures.maximum_speed.steps import read_windows
-from procedures.servomotor import carrying, hold, segments, wiring
+from procedures.maximum_speed.steps import read_windows, turned
+from procedures.servomotor import carrying, encoder, hold, segments, wiring
 from procedures.servomotor.conventions import conventions
 from procedures.servomotor.direction import of_probe
 from procedures.servomotor.parameters import BIASES, chosen, named, stated, write
@@ -67,7 +67,6 @@ SD = Quantity(
 )
 SINGLES = (SPEED_HALF, SPEED_OP, RATIO, RATIO_PREDICTED, PREDICTED_HALF, PREDICTED_OP, SLOPE)
 MEASURES = (*SINGLES, SD)
-WORDS = {"half": "λ = 1/2", "op": "λ by (6.24)"}
 
 
 def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
@@ -119,6 +118,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     limit, machine = limit_of(rig, plan), conventions(rig)
     windows = read_windows(recording, limit)
     findings.add(checks.of_windows(windows, machine, plan))
+    findings.gate(encoder.of_counts(turned(recording), plan.encoder_counts))
     findings.add(checks.of_law(windows, limit))
     facts = {name: recording.calibration(name) for name in ("spindown", "torque-constant")}
     result = estimates.evaluate(windows, plan, rig, facts)
@@ -131,8 +131,8 @@ def measured(result: Result) -> Iterator[Measured]:
     """Speeds and ratio, then what is expected, and the ripple of each sharing."""
     for quantity in SINGLES:
         yield quantity.measured(result.estimates[quantity.name])
-    for name, where in WORDS.items():
-        yield SD.measured(result.estimates[f"ripple_{name}"], where)
+    for sharing, name in NAMES.items():
+        yield SD.measured(result.estimates[f"ripple_{name}"], WORDS[sharing])
 
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
@@ -154,8 +154,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 
 def foresees(rig: RigFile, plan: Plan, facts: Mapping[str, Calibration]) -> Iterable[str]:
-    """Speeds that the rig does not allow, by the adopted torque constant and drag."""
-    return foresight.speeds(rig, plan, facts)
+    """Speeds that the rig does not allow, and windows too short for them, by the adopted torque constant and drag."""
+    return foresight.of_facts(rig, plan, facts)
 
 
 def figures(result: Result, recording: Recording[Plan]) -> Iterable[Figure]:

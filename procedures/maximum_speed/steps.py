@@ -14,7 +14,7 @@ from bench.recording import Captured, Recording, Step
 from bench.rigfile.roles import ANGLE, STATUS
 from procedures.maximum_speed import fit
 from procedures.maximum_speed.fit import Turning
-from procedures.maximum_speed.plan import HALF, OP, Plan
+from procedures.maximum_speed.plan import HALF, OP, WORDS, Plan
 from procedures.maximum_speed.requires import ACROSS, BOUND, DEMANDS, GIVEN, SHARE, TURNED, _of_law, channels, coils
 from procedures.servomotor.conventions import Servomotor, conventions
 
@@ -74,7 +74,7 @@ class Window:
     def where(self) -> str:
         """How it is named to the reader."""
         way = "forward" if self.direction > 0 else "backward"
-        return f"{self.sharing}, {way}, run {self.repeat + 1}"
+        return f"{WORDS[self.sharing]}, {way}, run {self.repeat + 1}"
 
 
 def read_windows(recording: Recording[Plan], limit_A: float) -> list[Window]:
@@ -90,6 +90,12 @@ def read_windows(recording: Recording[Plan], limit_A: float) -> list[Window]:
             "found no runs at the torque limit; expected those of the plan (was the run stopped early?)"
         )
     return found
+
+
+def turned(recording: Recording[Plan]) -> list[Array]:
+    """The captured angles of all windows, rad, as the encoder tells them."""
+    found = (c for step in recording.steps(RUN) for c in recording.captures(number=step.labels["number"]))
+    return [c.arrays(TURNED)[TURNED] for c in found if TURNED in c.channels]
 
 
 def _read(recording: Recording[Plan], step: Step, machine: Servomotor, limit_A: float) -> Window:
@@ -132,7 +138,9 @@ def _whole(capture: Captured, speed: float) -> int:
     """
     whole = fit.whole_turns(capture.samples, capture.rate_hz, speed)
     if not whole:
-        raise AnalysisError(f"capture of a run at {speed:.1f} rad/s: found less than a turn; expected one at least")
+        raise AnalysisError(
+            f"capture of a run at {speed:.1f} rad/s: found less than a turn; expected one at least. Give a longer capture_s"
+        )
     return whole
 
 

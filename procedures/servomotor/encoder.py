@@ -14,19 +14,17 @@ Array = npt.NDArray[np.float64]
 SAME = 0.01  # of a count
 LEAST_RAD = 4e-6  # what single precision makes of one angle near pi, eight times: nearer ones are the same
 FEWEST = 8  # angles, that a count is read from
+NEXT = 1.5  # of a count: nearer are those that are one apart
 
 
 def count_of(readings: Iterable[Array]) -> float:
     """The smallest step between angles that are told, rad; NaN where hardly any are. A rotor that comes by an edge slowly tells
     it, whatever it does else."""
-    least, many = math.inf, 0
-    for angle in readings:
-        told = np.unique(angle)
-        gaps = np.diff(told)
-        gaps = gaps[gaps > LEAST_RAD]
-        many += len(gaps)
-        least = min(least, float(gaps.min(initial=math.inf)))
-    return least if many >= FEWEST else math.nan
+    gaps = np.concatenate([np.diff(np.unique(angle)) for angle in readings] or [np.zeros(0)])
+    gaps = gaps[gaps > LEAST_RAD]
+    if len(gaps) < FEWEST:
+        return math.nan
+    return float(np.median(gaps[gaps < NEXT * gaps.min()]))  # single precision makes single ones smaller
 
 
 def of_counts(readings: Iterable[Array], counts: int) -> Iterator[Finding]:

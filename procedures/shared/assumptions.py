@@ -93,7 +93,7 @@ LIFT_OFF = (
     "and more where the angle is smaller; the angle that is measured stays.",
     "A load that changes between the ring and the hold, such as a weight that is lifted off with the shaft.",
     "A weight that hung on the shaft in force-coupling already, and hangs there still: 0.1 kg on the hook makes the angle 0.1° "
-    "larger at 2.5°, 0.3° at 1.1°. From some 1.1 kg on it is found.",
+    "larger at 2.5°, 0.3° at 1.1°. Where the rig file tells the shaft's mass it is found from a quarter of its weight on.",
     "What changes between force-coupling and this run by less than is looked for: 10 g on the hook moves the angle by 0.01° at "
     "2.5°, by 0.03° at 1.1°, and by several of its uncertainties on a machine that nearly lifts at 0; 5 mA of the limit of the "
     "segments moves it as 6 g do.",

@@ -7,9 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pytest
+from scipy.signal import butter, lfilter
 
 from bench.cli.motion_truth import truth_of_motion
+from bench.cli.unfit import unfit
 from bench.cli.virtual import Simulated, simulated_run
 from bench.findings import Effect, Finding
 from bench.procedure import Measured
@@ -21,6 +24,7 @@ from procedures.derivative.procedure import BY_LINE, MEASURES, WHOLE, check, pro
 from procedures.one_axis.bank import LITERAL, aligned, bank, literal
 from reports.figures import draw as draw_figure
 
+Array = npt.NDArray[np.float64]
 QUICK = {"lines_hz": (7.3, 16.3, 53.3, 90.7), "record_s": 2.0, "periods": 12}
 TABLE = [  # degree, spacing in ms, band by Euler, upper edge exact, noise gain, false derivative by Euler
     (5, 6, (15, 90), 99, 2474, 27.8), (6, 6, (3, 117), 127, 3785, 1.75), (6, 9, (0.5, 80), 84, 2468, 0.52),
@@ -96,6 +100,42 @@ def test_an_exciter_that_turns_faster_is_no_noise(tmp_path: Path) -> None:
     assert coverage_factor(7) * noise.u < 50
 
 
+def watched(position: Array, spacing: int = 120) -> tuple[Array, Array]:
+    """Positions (n,) m from where the filters of degree 7 are full on, and their velocity."""
+    rows = bank(7, spacing, "euler", 1e-4)
+    first = 2 * spacing - 1
+    return position[first:], rows.applied(position, first % spacing)
+
+
+@pytest.mark.parametrize("low_pass_hz", [None, 3000.0, 1000.0])
+def test_the_noise_gain_knows_no_colour(low_pass_hz: float | None) -> None:
+    """Noise of a sensor with a low-pass, and a body that follows it (poles -50 +- 300 i): taken as white from the upper half
+    of the spectrum, 3 kHz made it 17 % too great and 1 kHz 45 %, by U of 2 %."""
+    rng, own = np.random.default_rng(6), bank(7, 120, "euler", 1e-4)
+    off, k = [], np.arange(2000) * 1e-4
+    body = 92500 / 300 * 1e-4 * np.exp(-50 * k) * np.sin(300 * k)
+    for _ in range(6):
+        noise = 1.3e-7 * rng.normal(size=40239)
+        if low_pass_hz is not None:
+            noise = np.asarray(lfilter(*butter(1, low_pass_hz, fs=1e4), noise))
+        y, v = watched(noise - np.convolve(noise, body)[: len(noise)])
+        each = fit.noise(y, v, 40.0, 120, 1e-4, 8, own.power)
+        u = float(each.std(ddof=1)) / np.sqrt(8)
+        assert u < 0.015 * own.noise_gain
+        off.append((float(each.mean()) - own.noise_gain) / (coverage_factor(7) * u))
+    assert max(map(abs, off)) < 1.6
+    assert np.sqrt(np.mean(np.square(off))) < 0.75
+
+
+def test_a_velocity_that_is_noisier_than_its_weights_has_more_noise_gain() -> None:
+    """As much again, from elsewhere: root 2 of it."""
+    rng, own = np.random.default_rng(7), bank(7, 120, "euler", 1e-4)
+    y, v = watched(1.3e-7 * rng.normal(size=40239))
+    more = 1.3e-7 * own.noise_gain * rng.normal(size=len(v))
+    found = float(fit.noise(y, v + more, 40.0, 120, 1e-4, 8, own.power).mean())
+    assert found == pytest.approx(np.sqrt(2) * own.noise_gain, rel=0.01)
+
+
 def test_the_truth_is_recovered(tmp_path: Path) -> None:
     run = derived(tmp_path)
     truth = truth_of_motion(run)
@@ -162,10 +202,24 @@ def test_planted_defects_do_not_pass(
         ({"lines_hz": (30.0, 15.0)}, "in order"),
         ({"window_s": 0.01205}, "whole ticks"),
         ({"lines_hz": (0.5, 60.0), "periods": 40}, "memory holds"),
+        ({"lines_hz": (0.05, 60.0)}, "0.1 to 2000, the range of inject_hz"),
+        ({"offset_m": 4e-4}, "offset_m: found 0.0004 m; expected -0.0001 to 0.0001, the range of ref"),
+        ({"amplitude_A": 0.5}, "amplitude_A: found 0.5 A; expected 0 to 0.25, the range of inject_amplitude"),
+        ({"amplitude_A": 0.3}, "amplitude_A: found 0.3 A; the envelope allows 0.25 A"),
     ],
 )
 def test_a_plan_that_cannot_work_is_told(plan: dict[str, Any], said: str) -> None:
     assert any(said in line for line in check(load_rig("amb1dof"), Plan(**plan)))
+
+
+def test_an_estimator_out_of_range_is_told_before_anything_starts() -> None:
+    said = [*unfit(procedure, load_rig("amb1dof"), Plan(degree=12))]
+    assert len(said) == 1
+    assert "degree: found 12" in said[0]
+
+
+def test_no_title_names_what_the_plan_sets() -> None:
+    assert not any(character.isdigit() for q in procedure.measures for character in q.title)
 
 
 def test_the_default_plan_fits() -> None:

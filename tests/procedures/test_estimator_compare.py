@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pytest
+from pydantic import ValidationError
 
 from bench.cli.motion_truth import truth_of_motion
 from bench.cli.virtual import Simulated, simulated_run
@@ -16,15 +19,24 @@ from bench.errors import AnalysisError, BenchError
 from bench.findings import Effect, Finding
 from bench.procedure import Measured
 from bench.rigfile import load_rig
-from bench.uncertainty import Estimate, coverage_factor, interval
-from procedures.estimator_compare import estimates, fit
+from bench.rigfile.roles import Status
+from bench.uncertainty import Estimate, Influence, coverage_factor, interval
+from procedures.estimator_compare import checks, estimates, fit
 from procedures.estimator_compare.observers import predicted_ratio, ratio
 from procedures.estimator_compare.plan import Plan
 from procedures.estimator_compare.procedure import MEASURES, check, procedure, step_count
+from procedures.estimator_compare.requires import HANG
+from procedures.estimator_compare.steps import Taken
+from procedures.one_axis.bank import bank
 from procedures.one_axis.conventions import conventions
 from reports.figures import draw as draw_figure
+from sim_backend.controller.controls import in_force
+from sim_backend.machines.amb1dof import truth_compare
+from sim_backend.motion import CompareAsked
+from sim_backend.truth import draw
 
 TICK = 1e-4
+RIGS = Path(__file__).resolve().parents[2] / "rigs"
 
 
 def compared(folder: Path, seed: int = 1, truth: Mapping[str, float] | None = None, **plan: Any) -> Simulated:
@@ -65,6 +77,38 @@ def test_skewed_repeats_have_a_skewed_interval() -> None:
     assert found.value == pytest.approx(math.e)
     assert math.log(bounds.low) == pytest.approx(1 - 2.484, abs=0.1)
     assert math.log(bounds.high) == pytest.approx(1 + 2.484, abs=0.1)
+
+
+def test_what_is_told_in_metres_is_the_shafts_own(tmp_path: Path) -> None:
+    """A sensor that reads 1 % too much, the end of its certificate: its reading of a load's integral is known to 0.1 %."""
+    run = compared(tmp_path, 1, {"position.gain": 1.01})
+    truth, found = truth_of_motion(run), told(run)
+    for name in ("y_50_100@overlapping", "peak@overlapping", "integral@overlapping", "quiet@observer",
+                 "velocity_noise@difference"):  # fmt: skip
+        assert "sensors/position/gain" in found[name].contributions, name
+        bounds = interval(found[name], 1)
+        middle, half = (bounds.high + bounds.low) / 2, (bounds.high - bounds.low) / 2
+        assert abs(truth[name] - middle) < 1.5 * half, name
+    for name, e in found.items():
+        if "ratio" in name or "error" in name:
+            assert "sensors/position/gain" not in e.contributions, name
+    integral = found["integral@overlapping"]
+    assert integral.value / truth["integral@overlapping"] == pytest.approx(1.01, abs=0.004)
+    assert 0.008 < interval(integral, 1).high / integral.value - 1 < 0.02
+
+
+def test_the_truth_of_a_motion_is_that_of_the_shaft() -> None:
+    """Read 1 % too great: the integral of its deviation is that of where its true velocity takes the shaft."""
+    rig = load_rig("amb1dof")
+    drawn = draw(rig, 3, {"position.gain": 1.01, "harmonic": 1e-9, "position_noise_peak": 1e-12})
+    chosen = {"estimator": 0.0, "watched": -1.0}
+    asked = CompareAsked({}, {}, {"difference": chosen}, "M1", 0.3, 2.5)
+    plant = truth_compare._plant(drawn, in_force(rig, drawn.machine, chosen), 0, 1.0)
+    plant.run(30000)
+    plant.load(drawn.values["masses.M1"] * drawn.values["site.gravity"], drawn.values["load_rise_s"])
+    moved = np.cumsum(plant.run(10000, 1)[1][:, truth_compare.AT["true_velocity"]]) * TICK
+    truth = truth_compare.compare(rig, drawn, asked)
+    assert truth["integral", "difference"] == pytest.approx(np.abs(moved).sum() * TICK, rel=2e-3)
 
 
 @pytest.mark.long
@@ -163,6 +207,65 @@ def test_the_switch_is_found_in_the_current() -> None:
     assert abs(fit.switched_at(current + after, y, v, disturbance, 3000, TICK) - 3123) <= 1
     with pytest.raises(AnalysisError, match="to come in"):
         fit.switched_at(current, y, v, disturbance, 3000, TICK)
+
+
+def test_a_lead_that_leaves_nothing_to_judge_is_named() -> None:
+    y = np.random.default_rng(1).normal(0, 1e-7, 15000)
+    for found in (lambda: fit.moved_at(y, 1000, TICK), lambda: fit.switched_at(y, y, y, y, 1000, TICK)):
+        with pytest.raises(AnalysisError, match=r"lead_s: found 0\.1 s"):
+            found()
+    with pytest.raises(ValidationError, match="lead_s"):
+        Plan(lead_s=0.1)
+
+
+@pytest.mark.long
+def test_the_shortest_lead_can_be_analysed(tmp_path: Path) -> None:
+    assert wrong(compared(tmp_path, 1, lead_s=0.2)) == set()
+
+
+def capture(estimator: str, v: npt.NDArray[np.float64], y: npt.NDArray[np.float64]) -> Taken:
+    return Taken(HANG, estimator, 0, y, v, np.empty(0), np.empty(0), TICK, Status(0), 0, len(y))
+
+
+def test_an_estimator_that_is_the_overlapping_one_is_told() -> None:
+    """A controller that runs the two filters for the difference had both rooms alike: a ratio of 1.00, as the page says."""
+    weights, rng = bank(7, 120, "euler", TICK), np.random.default_rng(2)
+    whole = 1e-6 * np.sin(2 * math.pi * 40 * np.arange(6000) * TICK) + 1.3e-7 * rng.normal(size=6000)
+    y, v = whole[239:], weights.applied(whole, 17)
+    plain = np.gradient(y, TICK)
+    found = [*checks.of_weights([capture("overlapping", v, y), capture("difference", v, y)], weights.rows)]
+    assert [(f.code, f.where, f.effect) for f in found] == [("estimators-alike", "difference", Effect.INDETERMINATE)]
+    assert [*checks.of_weights([capture("overlapping", v, y), capture("difference", plain, y)], weights.rows)] == []
+    assert [f.code for f in checks.of_weights([capture("single", v, y)], weights.rows)] == ["estimators-alike"]
+
+
+@pytest.mark.long
+def test_a_controller_that_runs_the_overlapping_filters_for_the_difference(tmp_path: Path) -> None:
+    shipped = (RIGS / "amb1dof.toml").read_text(encoding="utf-8")
+    plain = "difference = { estimator = 0, watched = -1 }"
+    assert plain in shipped
+    shutil.copy(RIGS / "amb1dof.dbc", tmp_path)
+    (tmp_path / "amb1dof.toml").write_text(
+        shipped.replace(plain, "difference = { estimator = 2, watched = 2 }"), encoding="utf-8"
+    )
+    rig, chosen = str(tmp_path / "amb1dof.toml"), {"repeats": 3, "loaded": ("overlapping", "difference")}
+    run = simulated_run("estimator-compare", rig, 1, chosen, tmp_path / "recording.mcap")
+    assert wrong(run) == {"estimators-alike"}
+
+
+def test_the_sensors_gain_makes_no_two_estimators_alike() -> None:
+    """Noise of 1.9 and of 1.0, known to 0.1 %, by a sensor whose gain is known to 30 %."""
+    gain = Estimate.of(1.0, Influence("sensors/position/gain", "gain", 0.3, "1", "B", "rectangular"))
+    scatter = np.exp(0.003 * np.array([-1.0, 0.0, 1.0]))
+
+    def of(ratio: float) -> list[Finding]:
+        noise = {"observer": scatter, "difference": ratio * scatter}
+        by = {e: estimates._told("velocity_noise", e, x, gain) for e, x in noise.items()}
+        result = estimates.Result({}, {"velocity_error": {}, "velocity_noise": by}, {}, ())
+        return [*checks._same(result, Plan(engaged=("single",), loaded=("observer", "difference")))]
+
+    assert of(1.9) == []
+    assert [f.code for f in of(1.0)] == ["estimators-alike"]
 
 
 def test_what_the_poles_predict() -> None:

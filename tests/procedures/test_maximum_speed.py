@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Mapping
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -22,11 +23,14 @@ from bench.procedure import Measured
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, interval
 from bench.units import RPM
-from procedures.maximum_speed.plan import Plan
+from procedures.maximum_speed import foresight, running
+from procedures.maximum_speed.plan import HALF, Plan
 from procedures.maximum_speed.procedure import check, foresees
+from procedures.servomotor.conventions import conventions
 from sim_backend.truth import nominal
 
 SHORT: dict[str, Any] = {"repeats": 3, "average_s": 1.0, "dwell_s": 1.2}
+KEYS = ("average_s", "capture_s")
 RAISED: dict[str, Any] = {**SHORT, "limit_A": 2.75, "carried_A": 2.0, "bias_A": 4.0, "dwell_s": 4.0}
 BEFORE: Mapping[str, dict[str, Any]] = {
     "torque-constant": {"masses": ("M2", "M3"), "wiring_A": 0.5, "settle_s": 0.5, "average_s": 0.2},
@@ -128,7 +132,31 @@ def test_a_plan_that_would_trip_is_refused_by_the_facts(tmp_path: Path, first: d
     rig = load_rig("tsbs12")
     assert list(foresees(rig, Plan(**RAISED), first)) == []
     (slow,) = foresees(rig, Plan(**{**RAISED, "carried_A": 2.7}), first)
-    assert "lambda 1/2" in slow
+    assert "λ = 1/2" in slow
+
+
+def test_windows_in_which_the_rotor_turns_too_little_are_refused(first: dict[str, Calibration]) -> None:
+    """28 rad/s are expected of tsbs12 with its motor raised, 20 provided for (drawn machines have 21): two turns take 0.7 s.
+    By hand: 0.2 A of 0.75 A of torque current are worth 7.4 rad/s at B 0.076."""
+    rig, raised = load_rig("tsbs12"), Plan(**RAISED)
+    slow = foresight.slow_rad_s(rig, raised, first)
+    fast = foresight.expected_of(rig, raised, first).speed[HALF]
+    assert fast - slow == pytest.approx(0.2 * 2.8 / 0.076, rel=0.1)
+    short = Plan(**{**RAISED, "average_s": 0.5, "capture_s": 0.2})
+    said = list(foresees(rig, short, first))
+    assert [text.split(":")[0] for text in said] == list(KEYS)
+    assert f"{fast:.1f} rad/s are expected" in said[0]
+    times = {key: float(text.split(f"Give {key}=")[1].split()[0]) for key, text in zip(KEYS, said, strict=True)}
+    assert times == {"average_s": pytest.approx(0.7, abs=0.11), "capture_s": pytest.approx(0.4, abs=0.11)}
+    assert list(foresees(rig, Plan(**{**RAISED, **times}), first)) == []
+    for key, turns in (("average_s", 2), ("capture_s", 1)):  # the machine that the plan's own speeds would have lost
+        assert times[key] * 21 / (2 * math.pi) > turns
+    crawling = Plan(**{**RAISED, "carried_A": 2.55, "average_s": 2.0})  # 7 rad/s, half of which are 1.1 turns in 2 s
+    assert any(text.startswith("average_s: 2 s are 1.") for text in foresees(rig, crawling, first))
+
+
+def test_a_default_plan_has_windows_that_are_long_enough(known: dict[str, Calibration]) -> None:
+    assert list(foresees(load_rig("tsbs12-drag"), Plan(), known)) == []
 
 
 def test_a_drawn_machine_that_the_plan_is_none_for_is_counted_apart(
@@ -184,7 +212,7 @@ def test_a_raised_rotor_runs_on_the_machine_of_the_thesis(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("defect", "code", "says"),
     [
-        ({"kept_allocation": 2.0}, "sharing-not-switched", "lambda is 0.500"),
+        ({"kept_allocation": 2.0}, "sharing-not-switched", "λ is 0.500 where λ by (6.24) makes"),
         ({"factor_segment_max": 1.001}, "bound-differs", "another limit"),
         ({"factor_lag_compensation": 0.0}, "commutation-late", "behind the field"),
         ({"exchange_segments": 1.0}, "segments-exchanged", "exchanged"),
@@ -201,10 +229,42 @@ def test_a_defect_is_named_and_does_not_pass(
     assert says in found[code].text
 
 
+def test_an_encoder_of_other_counts_is_told(tmp_path: Path, known: dict[str, Calibration]) -> None:
+    done = run(tmp_path, "tsbs12-drag", 1, known, encoder_counts=5000)
+    assert "4096 counts a turn" in serious(done)["encoder-counts"].text
+
+
 def test_a_run_that_ends_at_its_guard_is_no_maximum_speed(tmp_path: Path, known: dict[str, Calibration]) -> None:
     """The drag is half of what was adopted: the rotor reaches the speed reference, and the run ends there."""
     found = serious(run(tmp_path, "tsbs12-drag", 2026, known, {"viscous": 0.12}))
     assert set(found) == {"guarded"}
+    assert found["guarded"].where == "λ = 1/2"
+
+
+def test_where_a_finding_is_seen_has_the_words_of_the_results(tmp_path: Path, known: dict[str, Calibration]) -> None:
+    """Those of the ripple's places, and no names of settings or quantities."""
+    done = run(tmp_path, "tsbs12-drag", 2026, known, {"viscous": 1.06 * 0.2813, "kept_allocation": 2.0})
+    places = {m.where for m in done.results if isinstance(m, Measured) and m.where}
+    found = [f for f in done.results if isinstance(f, Finding)]
+    assert places == {"λ = 1/2", "λ by (6.24)"}
+    told = {f.code: f.where for f in found}
+    assert told["speed-contradicts"] in places
+    assert told["sharing-not-switched"].startswith("λ by (6.24), forward, run 1")
+    assert not [f for f in found if re.search(r"\b(priority|half|op)\b", f"{f.text} {f.where}")]
+
+
+def test_a_load_that_is_not_reached_is_told_of_the_set_point_that_had_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A motor that carries 2.2 A wherever it is held: i_y belongs to the last set point that was written, not to the next."""
+    machine, written, events = load_rig("tsbs12"), [], []
+    i_m = conventions(machine).segments
+    rig: Any = SimpleNamespace(file=machine, clock=SimpleNamespace(sleep=lambda _: None))
+    record: Any = SimpleNamespace(event=lambda kind, **said: events.append((kind, said)))
+    monkeypatch.setattr(running, "write", lambda _, values: written.append(values["motor.ref_along"]))
+    monkeypatch.setattr(running.first_look, "watched", lambda *_: dict(zip(i_m, (2.2, 0.0, -2.2, 0.0), strict=True)))
+    assert not running.carry_so_much(rig, Plan(carried_A=2.0), record)
+    ((kind, said),) = events
+    assert (kind, said["at"]) == ("not-carried", written[-1])
+    assert said["found"] == pytest.approx(2.2)
 
 
 @pytest.mark.parametrize(

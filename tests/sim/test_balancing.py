@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 from bench.rigfile import load_rig
+from sim_backend.machines.tsbs.balancing import folded, top
 from sim_backend.motion import CircleAsked
 from sim_backend.truth import draw, nominal
 
@@ -44,3 +46,20 @@ def test_a_bound_that_is_another_than_was_asked_is_a_bound_to_the_truth_too() ->
     asked = {**nominal(load_rig("tsbs12-offset")), "factor_gamma_max": 0.7}
     found = circled("tsbs12-offset", 1, -1, **asked)
     assert found["gamma_extreme", ""] == pytest.approx(0.7 * LIMIT, rel=1e-4)
+
+
+@pytest.mark.parametrize("hz", [0.01, 0.1, 0.25, 0.3, 0.37, 1.0])
+def test_a_circle_of_any_rate_has_the_peak_of_its_load(hz: float) -> None:
+    """48 turns at 1 kHz, |i_y| = 4.0 + 2.8 cos A with its top at 126 degrees: a turn of 0.3 Hz is no whole number of values."""
+    t = (np.arange(round(48 / (hz * 1e-3))) + 0.5) * 1e-3
+    found = folded(4.0 + 2.8 * np.cos(2 * math.pi * (hz * t - 0.35)), hz)
+    assert 100 <= len(found) <= 400
+    assert top(found) == pytest.approx(6.8, rel=1e-5)
+    assert abs(np.argmax(found) / len(found) - 0.35) < 1.5 / len(found)
+
+
+def test_circles_whose_turn_is_no_whole_number_of_means_have_a_truth() -> None:
+    """At 0.3 Hz as at 0.25: the load is the same, and the path hardly another."""
+    found, usual = (circled("tsbs12-offset", 2, -1, hz=hz) for hz in (0.3, 0.25))
+    assert found["peak_i_y", "before"] == pytest.approx(usual["peak_i_y", "before"], rel=1e-3)
+    assert found["reduction", ""] == pytest.approx(found["predicted_reduction", ""], abs=2e-3)

@@ -107,8 +107,7 @@ def _idle(done: Simulated) -> list[float]:
 
 
 def maximum_speed(done: Simulated) -> Found:
-    from procedures.maximum_speed.plan import HALF, OP
-    from procedures.maximum_speed.procedure import WORDS
+    from procedures.maximum_speed.plan import HALF, NAMES, OP, SHARINGS, WORDS
     from procedures.maximum_speed.running import guard_of, limit_of
     from procedures.maximum_speed.steps import RUN, SET_POINT
     from procedures.servomotor.hold import GAINS
@@ -127,7 +126,7 @@ def maximum_speed(done: Simulated) -> Found:
         {**chosen(rig, "commutation", plan.commutation), **named(rig, {"motor.segment_limit": limit_of(rig, plan)}),
          **chosen(rig, "torque", "limit")},
     )  # fmt: skip
-    sharings = {s: chosen(rig, "sharing", s) for s in (HALF, OP)}
+    sharings = {s: chosen(rig, "sharing", s) for s in SHARINGS}
     begun: dict[int, list[int]] = {1: [], -1: []}
     for step in done.recording.steps(RUN):
         begun[int(step.labels["direction"])].append(step.start_ns - done.recording.start_ns)
@@ -136,10 +135,10 @@ def maximum_speed(done: Simulated) -> Found:
     true = of.speeds(
         rig, done.drawn, SpeedsAsked(settings_of(done), before, sharings, guard_of(rig, plan), watched, at_s)
     )
-    for s, name in ((HALF, "half"), (OP, "op")):
+    for s, name in NAMES.items():
         yield f"speed_{name}", "", true[s]["speed"]
         yield f"predicted_{name}", "", true[s]["speed"]
-        yield "speed_sd", WORDS[name], true[s]["ripple"]
+        yield "speed_sd", WORDS[s], true[s]["ripple"]
     yield "ratio", "", true[OP]["speed"] / true[HALF]["speed"]
     yield "ratio_predicted", "", true[OP]["bound"] / true[HALF]["bound"]
     yield "torque_slope", "", of.drag(done.drawn, DragAsked(plan.bias_A, plan.bias_A, True))["B"]

@@ -21,6 +21,7 @@ Array = npt.NDArray[np.float64]
 SPREAD_S = 0.6  # over which the moments lie at which a switch or a load comes: whole times of both filters' pattern
 SWITCHES, LOADS = 96, 144  # how many moments: what is left of their noise is a quarter of that of ten repeats
 SWITCHED, LOADED = ("velocity_error", "disturbance_error", "y_50_100"), ("peak", "integral", "quiet", "velocity_noise")
+MOTIONS = ("y_50_100", *LOADED)  # of the shaft: what is read, over the sensor's gain
 AT = {name: k for k, name in enumerate(TRACE)}
 
 
@@ -33,6 +34,8 @@ def compare(rig: RigFile, drawn: Truth, asked: CompareAsked) -> Mapping[tuple[st
             found = np.array([one(drawn, asked, used, k) for k in range(SWITCHES if one is _switched else LOADS)])
             for name, values in zip(names, found.T, strict=True):
                 logs[name, estimator] = float(np.log(values).mean())
+    gain = math.log(drawn.plant.position_gain)
+    logs = {(name, estimator): log - gain * (name in MOTIONS) for (name, estimator), log in logs.items()}
     switched, loaded = [*asked.engaged], [*asked.loaded]
     pairs = [(n, e, switched[-1]) for n in SWITCHED for e in switched[:-1]]
     pairs += [(n, e, loaded[0]) for n in LOADED for e in loaded[1:]]

@@ -1,9 +1,9 @@
 """Load balancing on a circle (T 6.7.3): what the drawn machine does in the mean, and what its own constants say it should.
 
 The machine runs with noise of its position sensors, another than that of the run: gamma follows a noisy load by a slew, and so
-lags behind more than without. Means over TURNS leave little of it. The shaft stands at its home angle, within the count of its
-encoder where turning it as the run does has left it. The load on the motor is D, N, horizontal + j up; currents are those along
-the field.
+lags behind more than without. Means over many turns leave little of it. The shaft stands at its home angle, within the count of
+its encoder where turning it as the run does has left it. The load on the motor is D, N, horizontal + j up; currents are those
+along the field.
 """
 
 from __future__ import annotations
@@ -29,10 +29,11 @@ Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 AT = {name: k for k, name in enumerate(CHANNELS)}
 GAMMA = TRACE.index("gamma")
-MEAN = 10  # ms of which means are taken around the circle
-TURNS = 48
+MEAN_S, MEANS = 0.01, (100, 400)  # of which means are taken around the circle; so many of a turn, whatever it lasts
+ROW_S = PERIOD_TICKS * TICK_S
+TURNS, SLOW_HZ = 48, 0.25  # turns that are watched; of slower circles as many as last as long, one at least
 CUT = 0.995  # of the limit of gamma
-NEAR, ORDERS = 8, 2  # means to either side of a peak, through which a parabola is laid; harmonics of the path
+NEAR, ORDERS = 0.02, 2  # of a turn to either side of a peak, through which a parabola is laid; harmonics of the path
 NEVER = -1  # a visit that no run is of: its noise is the truth's own
 FIXED = 4  # rounds for the direction of balanced currents, which sensors' zeros turn by a thousandth
 
@@ -53,32 +54,37 @@ def _moved(rig: RigFile, drawn: Truth, p: PlantParams, asked: CircleAsked, branc
             for control in known[name]:
                 plant.set(control.name, control.of(value) * drawn.defects.get(f"factor_{name}", 1.0))
 
-    turn = round(1 / (abs(asked.hz) * TICK_S))
+    hz = abs(asked.hz)
+    watched = max(round(TURNS * min(1.0, hz / SLOW_HZ)), 1)
+
+    def ticks(turns: float) -> int:
+        return round(turns / (hz * TICK_S))
+
     for values, seconds in (*asked.turned, (asked.carried, 2.0)):
         write(values)
         plant.run(round(seconds / TICK_S))
     write(asked.circled)
     plant.run(round(asked.ramp_s / TICK_S))
-    before = plant.run(TURNS * turn, PERIOD_TICKS)
-    plant.run(round((asked.engage_rad * math.copysign(1, asked.hz) / math.tau) % 1 * turn))
+    before = plant.run(ticks(watched), PERIOD_TICKS)
+    plant.run(ticks((asked.engage_rad * math.copysign(1, asked.hz) / math.tau) % 1))
     plant._s.law.balancing, plant._s.law.line = 1.0, branch * 1.2  # the side that the machine took
     write(asked.balanced)
-    plant.run(turn)
-    after = plant.run(TURNS * turn, PERIOD_TICKS)
+    plant.run(ticks(1))
+    after = plant.run(ticks(watched), PERIOD_TICKS)
     scale = (1 / p.position_gain[2] + 1 / p.position_gain[3]) / 2
     out: dict[tuple[str, str], float] = {}
     for when, (rows, _) in (("before", before), ("after", after)):
-        x, y = (_mean(i) for i in _currents(p, rows))
+        x, y = (folded(i, hz) for i in _currents(p, rows))
         out |= {
-            ("peak_i_y", when): _top(np.abs(y)),
-            ("peak_any", when): max(_top(np.abs(y)), _top(np.abs(x))),
+            ("peak_i_y", when): top(np.abs(y)),
+            ("peak_any", when): max(top(np.abs(y)), top(np.abs(x))),
             ("unbalance", when): unbalance(x, y),
-            ("error_radius", when): _off_circle(rows, asked.radius) * scale,
+            ("error_radius", when): _off_circle(rows, hz, asked.radius) * scale,
         }
     control = ControlParams(**{f.name: plant.get(f.name) for f in fields(ControlParams)})
-    paths = (_path(before[0]), _path(after[0]))
+    paths = (_path(before[0], hz), _path(after[0], hz))
     return out | {
-        ("gamma_extreme", ""): _extreme(np.abs(_mean(after[1][:, GAMMA])), control.gamma_max),
+        ("gamma_extreme", ""): _extreme(np.abs(folded(after[1][:, GAMMA], hz)), control.gamma_max),
         ("reduction", ""): out["peak_i_y", "after"] / out["peak_i_y", "before"] - 1,
         ("unbalance_ratio", ""): out["unbalance", "after"] / out["unbalance", "before"],
         ("predicted_reduction", ""): quasi_static(p, control, asked, branch, paths),
@@ -100,37 +106,43 @@ def _levitated(rig: RigFile, drawn: Truth, p: PlantParams, settings: Numbers) ->
     return plant
 
 
-def _path(rows: Array) -> Complex:
+def _path(rows: Array, hz: float) -> Complex:
     """Means of a turn, as the outboard sensors read."""
-    x, y = (_mean(rows[:, AT[name]]) for name in ("pos_xo", "pos_yo"))
+    x, y = (folded(rows[:, AT[name]], hz) for name in ("pos_xo", "pos_yo"))
     return x + 1j * y
 
 
-def _mean(x: Array) -> Array:
-    """Of values each ms over TURNS: means over MEAN of them and over the turns."""
-    out: Array = x.reshape(TURNS, -1, MEAN).mean(axis=(0, 2))
+def folded(x: Array, hz: float) -> Array:
+    """Of values each ROW_S of a circle of `hz` turns a second: means over MEAN_S of its phase and over the turns, from where
+    they begin on. A turn need not be a whole number of values, nor of means."""
+    count = min(max(round(1 / (hz * MEAN_S)), MEANS[0]), MEANS[1])
+    place = ((np.arange(len(x)) + 0.5) * ROW_S * hz * count).astype(int) % count  # the middle of a value is at no edge
+    out: Array = np.bincount(place, x, count) / np.bincount(place, minlength=count)
     return out
 
 
-def _top(x: Array) -> float:
-    """The greatest, by a parabola through those near it where it is a smooth top."""
-    k, s = int(np.argmax(x)), np.arange(-NEAR, NEAR + 1)
+def top(x: Array) -> float:
+    """The greatest of what `x` are means of, by a parabola through those near it where it is a smooth top: the mean of one over
+    an interval lies below its middle by a twelfth of its second coefficient."""
+    reach = round(NEAR * len(x))
+    k, s = int(np.argmax(x)), np.arange(-reach, reach + 1)
     c2, c1, c0 = np.polyfit(s, np.take(x, k + s, mode="wrap"), 2)
-    smooth = c2 < 0 and abs(c1) <= -2 * c2 * NEAR
-    return float(c0 - c1**2 / (4 * c2)) if smooth else float(x[k])
+    smooth = c2 < 0 and abs(c1) <= -2 * c2 * reach
+    return float(c0 - c1**2 / (4 * c2) - c2 / 12) if smooth else float(x[k])
 
 
 def _extreme(gamma: Array, limit: float) -> float:
     """A top that is cut off at the limit that the machine has, which a defect may make another than what was asked, or nearly,
     is no parabola."""
-    return float(gamma.max()) if gamma.max() > CUT * limit else _top(gamma)
+    return float(gamma.max()) if gamma.max() > CUT * limit else top(gamma)
 
 
-def _off_circle(rows: Array, radius: float) -> float:
+def _off_circle(rows: Array, hz: float, radius: float) -> float:
     """Greatest deviation along the radius of the turns' mean, of its harmonics up to ORDERS."""
-    spectrum = np.fft.rfft(_mean(np.hypot(rows[:, AT["pos_xo"]], rows[:, AT["pos_yo"]]) - radius))
+    off = folded(np.hypot(rows[:, AT["pos_xo"]], rows[:, AT["pos_yo"]]) - radius, hz)
+    spectrum = np.fft.rfft(off)
     spectrum[ORDERS + 1 :] = 0
-    return float(np.abs(np.fft.irfft(spectrum, round(len(rows) / TURNS / MEAN))).max())
+    return float(np.abs(np.fft.irfft(spectrum, len(off))).max())
 
 
 def _currents(p: PlantParams, rows: Array) -> tuple[Array, Array]:

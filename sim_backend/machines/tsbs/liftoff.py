@@ -14,7 +14,6 @@ from sim_backend.machines.tsbs.params import ControlParams, PlantParams
 
 FURTHEST_RAD = math.radians(8)  # where the search ends: there the force has turned by 64 degrees
 STEPS, HALVINGS = 128, 40
-LIGHT_N = 1.0  # an end that presses less on its ring is taken up by the start's own motion, or by noise
 
 
 @dataclass(frozen=True)
@@ -72,23 +71,23 @@ def surplus(p: PlantParams, at: Resting, gamma: float, limit_A: float) -> float:
 
 
 def thresholds(p: PlantParams, limit_A: float) -> tuple[float, float] | None:
-    """The angles, below and above, from which on the motor lifts, rad; None where it lifts at once (LIGHT_N), or never."""
+    """The angles, below and above, from which on the motor lifts as gamma is turned away from zero, rad; None where it lifts at
+    zero, or never. Whether an end that presses lightly is taken up by the start's motion is no matter of statics."""
     at = resting(p)
 
     def left(gamma: float) -> float:
         return surplus(p, at, gamma, limit_A)
 
-    grid = [p.gamma_zero + FURTHEST_RAD * k / STEPS for k in range(-STEPS, STEPS + 1)]
-    found = [left(gamma) for gamma in grid]
-    lowest = min(range(len(grid)), key=found.__getitem__)
-    if left(0.0) >= -LIGHT_N:
+    if left(0.0) >= 0:
         return None
     out = []
     for way in (-1, 1):
-        beyond = next((k for k in range(lowest, -1 if way < 0 else len(grid), way) if found[k] >= 0), None)
+        furthest = abs(p.gamma_zero + way * FURTHEST_RAD)
+        steps = [way * furthest * k / STEPS for k in range(STEPS + 1)]
+        beyond = next((k for k, gamma in enumerate(steps) if left(gamma) >= 0), None)
         if beyond is None:
             return None
-        low, high = grid[beyond - way], grid[beyond]
+        low, high = steps[beyond - 1], steps[beyond]
         for _ in range(HALVINGS):
             middle = (low + high) / 2
             low, high = (low, middle) if left(middle) >= 0 else (middle, high)
