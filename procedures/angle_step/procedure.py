@@ -46,7 +46,7 @@ CAPTURED = (AMPLITUDE, BOUND)
 MEASURES = (RISE, OVERSHOOT, SETTLING, FINAL, PEAK, EXCESS, SATURATED, *CAPTURED)
 TORQUE_CONSTANT = 2.87  # N m/A, T Table 6.2; for predictions before a run, and for nothing that is measured
 UPLOAD_S = 0.6  # what the upload of a capture is given at least, by whatever link
-LEAST = 12  # encoder counts of a step: the rotor may stand a count on, and 10 % of the step are beyond that
+LEAST = 11  # encoder counts of a step: the rotor may stand a count on, and 10 % of the step are beyond that
 CODES = {"static": 0.0, "priority": 1.0}
 
 

@@ -156,7 +156,7 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     off_centre = (
         rig.geometry["motor_stiffness"].value * 30e-6
     )  # magnetic centre against the sensors' zero, two tolerances
-    current = most * (carrying.gravity_share_N(rig) + off_centre) / carrying.ALPHA_D
+    current = most * (carrying.gravity_share_N(rig) + off_centre) / carrying.newtons_per_A(rig)
     allowed = carrying.MARGIN * stated(rig, "motor.segment_limit").default
     if current > allowed:
         yield f"gamma_rad: the motor would need {current:.1f} A; expected at most {allowed:.1f} A"

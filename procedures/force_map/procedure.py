@@ -178,8 +178,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     g = rig.geometry
     out = 1 + g["motor_to_outboard_amb"].value / g["amb_span"].value
     for i, d in ((plan.current_A, plan.offset_m), (plan.loaded_current_A, plan.loaded_offset_m)):
-        push = carrying.ALPHA_D * i + STIFFNESS_N_M * d * out
-        control = (carrying.SHAFT_N * 1.0 + push * out) / K_N_A + plan.bias_A * d / g["amb_gap"].value
+        push = carrying.newtons_per_A(rig) * i + STIFFNESS_N_M * d * out
+        control = (carrying.weight_N(rig) + push * out) / K_N_A + plan.bias_A * d / g["amb_gap"].value
         if control > 0.95 * plan.bias_A:
             yield (f"current_A, offset_m: {i:g} A at {d * 1e6:g} um takes {control:.2f} A of control current in the outboard "
                    f"AMB by prediction; the bias of {plan.bias_A:g} A allows {0.95 * plan.bias_A:.2f} A")  # fmt: skip

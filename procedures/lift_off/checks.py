@@ -10,12 +10,12 @@ import numpy.typing as npt
 
 from bench.findings import Effect, Finding
 from bench.rigfile import RigFile
-from bench.rigfile.places import Places
 from bench.rigfile.roles import ANGLE
 from bench.uncertainty import Estimate, interval
 from procedures.lift_off.estimates import Analysis
 from procedures.lift_off.plan import Plan
 from procedures.lift_off.steps import LAST
+from procedures.servomotor import carrying
 from procedures.servomotor.conventions import Servomotor, radial_currents
 from procedures.servomotor.parameters import stated
 from procedures.shared import signals
@@ -173,23 +173,14 @@ def of_place(a: Analysis, rig: RigFile, machine: Servomotor) -> Iterator[Finding
         return
     yield from _as_before(a)
     i_y = float(radial_currents(*(a.held.mean[c] for c in machine.segments))[1].mean())
-    share_N = _weight_N(rig)
-    if share_N is not None and abs(i_y / (weight := share_N / a.newtons_A) - 1) > LOAD:
+    told = carrying.told_weight_N(rig)
+    if told is not None and abs(i_y / (weight := told * carrying.lever(rig) / a.newtons_A) - 1) > LOAD:
         yield Finding(
             "load-unexpected",
             f"i_y is {i_y:.2f} A with the end up, and the shaft's weight should take {weight:.2f} A: something hangs on the "
             "shaft or holds it.",
             "i_y", Effect.INDETERMINATE,
         )  # fmt: skip
-
-
-def _weight_N(rig: RigFile) -> float | None:
-    """The motor's share of the shaft's weight, N, by moments about the inboard AMB; None where the rig file tells no mass."""
-    if rig.shaft is None or rig.shaft.mass is None:
-        return None
-    mass = Places(rig).number(rig.shaft.mass, "shaft.mass").number
-    arm = rig.geometry["com_to_inboard_amb"].value
-    return mass.value * rig.site.gravity.value * arm / (arm + rig.geometry["com_to_motor"].value)
 
 
 def _as_before(a: Analysis) -> Iterator[Finding]:

@@ -21,9 +21,7 @@ LOADS_SEEN, FACTS_SEEN = "from the loads", "from the facts"
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 STEP, BEFORE, AFTER = "circle", "before", "after"
-FEWEST = (
-    100  # bins of a turn, so that a parabola through two of them to either side of a peak is within 7.2 degrees of it
-)
+FEWEST = 100  # bins of a turn: a parabola through two of them to either side of a peak is within 7.2 degrees of it
 
 
 @dataclass(frozen=True)

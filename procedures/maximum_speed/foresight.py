@@ -10,7 +10,7 @@ from bench.rigfile import RigFile
 from bench.units import RPM
 from procedures.maximum_speed.fit import FEWEST_TURNS, Expected, expected
 from procedures.maximum_speed.plan import HALF, OP, WORDS, Plan
-from procedures.maximum_speed.running import guard_of, limit_of, newtons_per_A, newtons_per_m
+from procedures.maximum_speed.running import guard_of, limit_of, newtons_per_m
 from procedures.servomotor import carrying
 from procedures.servomotor.parameters import stated
 from procedures.spindown.estimates import drive_drag
@@ -30,7 +30,7 @@ def carrying_A(rig: RigFile, plan: Plan) -> float:
     if plan.carried_A:
         return plan.carried_A
     load = carrying.gravity_share_N(rig) - newtons_per_m(rig) * plan.set_point_m
-    return abs(load) / newtons_per_A(rig)
+    return abs(load) / carrying.newtons_per_A(rig)
 
 
 def reserve(rig: RigFile, plan: Plan) -> Iterator[str]:

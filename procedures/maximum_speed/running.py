@@ -43,12 +43,6 @@ def newtons_per_m(rig: RigFile) -> float:
     return rig.geometry["motor_stiffness"].value * (inboard + motor) / (inboard + sensor)
 
 
-def newtons_per_A(rig: RigFile) -> float:
-    """The motor's force constant, for predictions: what the controller takes it for, where it has a model of the motor."""
-    told = rig.capabilities.model.get("alpha_d")
-    return rig.parameters[told].default if told else carrying.ALPHA_D
-
-
 def carry_so_much(rig: Rig, plan: Plan, record: Recorder) -> bool:
     """Move the motor's set point until it takes `carried_A` of i_y, if that is asked for; False where its range does not do."""
     reach, machine, at = stated(rig.file, "motor.ref_along"), conventions(rig.file), plan.set_point_m
@@ -58,7 +52,7 @@ def carry_so_much(rig: Rig, plan: Plan, record: Recorder) -> bool:
         rig.clock.sleep(plan.settle_s)
         seen = first_look.watched(rig, record, machine.segments, LOOK_S / 2)
         i_y = (seen[machine.segments[0]] - seen[machine.segments[2]]) / 2
-        before, at = at, at + (i_y - plan.carried_A) * newtons_per_A(rig.file) / newtons_per_m(rig.file)
+        before, at = at, at + (i_y - plan.carried_A) * carrying.newtons_per_A(rig.file) / newtons_per_m(rig.file)
         at = min(max(at, reach.low), reach.high)
         near = abs(i_y - plan.carried_A) < CARRIED_A
         if not plan.carried_A or near or (at == before and 1 < i_y / plan.carried_A < MORE):

@@ -209,13 +209,13 @@ def _ranges(rig: RigFile, plan: Plan, furthest: float) -> Iterator[str]:
     share = conventions(rig).sensor_share(g["com_to_motor"].value, rig)
     pull = g["motor_stiffness"].value * share * furthest
     current, most = (
-        (carrying.gravity_share_N(rig) + pull) / carrying.ALPHA_D,
+        (carrying.gravity_share_N(rig) + pull) / carrying.newtons_per_A(rig),
         MARGIN * stated(rig, "motor.segment_limit").default,
     )
     if current > most:
         yield f"levels_m: the motor would need {current:.1f} A at {furthest * 1e6:.0f} µm; expected at most {most:.1f} A"
     span, arm = g["amb_span"].value, g["com_to_inboard_amb"].value
-    carried = carrying.SHAFT_N * arm / span
+    carried = carrying.weight_N(rig) * arm / span
     moved = (
         g["motor_stiffness"].value * ((arm + g["com_to_motor"].value) / span) ** 2
         + AMB_N_PER_A * plan.bias_A / g["amb_gap"].value

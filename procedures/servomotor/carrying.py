@@ -8,12 +8,13 @@ from bench.errors import RotorNotArrived
 from bench.procedure.rig import Rig
 from bench.rigfile import RigFile
 from bench.rigfile.capabilities import is_bound as can
+from bench.rigfile.places import Places
 from procedures.servomotor import hold
 from procedures.servomotor.parameters import stated, write
 
 NEEDED = ("motor.share", "motor.share_slew", "motor.ref_across", "motor.ref_along", "at.yi", *hold.NEEDED)
-SHAFT_N = 10.2 * 9.81  # T Table 6.1; for predictions before a run, and for nothing that is measured
-ALPHA_D = 12.1  # N/A, T Table 6.2; likewise
+SHAFT_N = 10.2 * 9.81  # T Table 6.1; of a shaft whose mass nobody told, for predictions before a run alone
+ALPHA_D = 12.1  # N/A, T Table 6.2; of a motor that nobody has a model of, likewise
 MARGIN = (
     0.8  # share of a current's limit that a prediction may use: force constants are within 10 %, the rest is control
 )
@@ -88,7 +89,30 @@ def approach(levels: Sequence[float]) -> list[float]:
     return sorted((x for x in levels if x < 0), reverse=True)[:-1]
 
 
-def gravity_share_N(rig: RigFile) -> float:
-    """What the motor carries, N: moments about the inboard AMB."""
+def told_weight_N(rig: RigFile) -> float | None:
+    """The shaft's weight, N, by the mass that the rig file tells; None where it tells none."""
+    if rig.shaft is None or rig.shaft.mass is None:
+        return None
+    return Places(rig).number(rig.shaft.mass, "shaft.mass").number.value * rig.site.gravity.value
+
+
+def weight_N(rig: RigFile) -> float:
+    """The shaft's weight for predictions, N."""
+    return told_weight_N(rig) or SHAFT_N
+
+
+def lever(rig: RigFile) -> float:
+    """Share of the weight that the motor carries: moments about the inboard AMB."""
     arm = rig.geometry["com_to_inboard_amb"].value
-    return SHAFT_N * arm / (arm + rig.geometry["com_to_motor"].value)
+    return arm / (arm + rig.geometry["com_to_motor"].value)
+
+
+def gravity_share_N(rig: RigFile) -> float:
+    """What the motor carries, for predictions, N."""
+    return weight_N(rig) * lever(rig)
+
+
+def newtons_per_A(rig: RigFile) -> float:
+    """The motor's force constant, for predictions: what the controller takes it for, where it has a model of the motor."""
+    told = rig.capabilities.model.get("alpha_d")
+    return rig.parameters[told].default if told else ALPHA_D

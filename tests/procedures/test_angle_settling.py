@@ -54,9 +54,17 @@ def test_counts_by_angles_that_pass_many_of_them_at_once() -> None:
     """3.4 counts a tick: no two readings in a row are a count apart, and those of several turns are."""
     angle = (np.floor(3.4 * np.arange(9000) + 0.3) * COUNT + np.pi) % (2 * np.pi) - np.pi
     told = angle.astype(np.float32).astype(np.float64)
-    assert count_of([told]) == pytest.approx(COUNT, rel=1e-3)
+    assert count_of([told]) == (pytest.approx(COUNT, rel=1e-3), True)
     assert list(of_counts([told], 4096)) == []
-    assert math.isnan(count_of([told[:3]]))
+    assert math.isnan(count_of([told[:3]])[0])
+
+
+def test_an_angle_without_counts_takes_any_that_are_fine_enough() -> None:
+    """Of an interpolated encoder: by 4096 counts there would be no edges to read between."""
+    smooth = np.sort(np.random.default_rng(4).uniform(0.0, 0.2, 4000))
+    (found,) = of_counts([smooth], 4096)
+    assert "shows no counts" in found.text
+    assert list(of_counts([smooth], int(found.text.split("give ")[1].split()[0]))) == []
 
 
 def test_how_far_a_rotor_ends_beyond_its_reference_is_told_in_the_direction_of_the_step(tmp_path: Path) -> None:
