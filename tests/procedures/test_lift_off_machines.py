@@ -21,6 +21,7 @@ from procedures.lift_off import checks, fit
 from procedures.lift_off.estimates import EARLY_HALF
 from procedures.lift_off.plan import Plan
 from procedures.lift_off.procedure import procedure
+from procedures.servomotor import carrying
 from procedures.servomotor.conventions import conventions
 from sim_backend.core import plant as core
 from sim_backend.machines.tsbs import liftoff
@@ -189,6 +190,17 @@ def with_mass(folder: Path, kg: float) -> RigFile:
         f'mass = {{ value = {kg}, unit = "kg", half_width = 0.1, distribution = "rectangular", source = "scales" }}\n'
     )
     return load_rig(path)
+
+
+def test_plans_are_foreseen_by_the_weight_and_the_motor_that_the_rig_file_tells(tmp_path: Path) -> None:
+    """A 20 kg shaft: by T's 10.2 kg a plan was foreseen to take half of its current, one of 6 kg was refused."""
+    rig, heavy = load_rig("tsbs12"), with_mass(tmp_path, 20.0)
+    told = heavy.site.gravity.value * 20.0 * carrying.lever(heavy)
+    assert carrying.gravity_share_N(heavy) == pytest.approx(told)
+    assert carrying.gravity_share_N(rig) == pytest.approx(10.2 * 9.81 * carrying.lever(rig))
+    stronger = rig.parameters["model_alpha_d"].model_copy(update={"default": 24.2})
+    other = rig.model_copy(update={"parameters": {**rig.parameters, "model_alpha_d": stronger}})
+    assert carrying.newtons_per_A(other) == 24.2
 
 
 def test_the_load_is_held_against_a_weight_that_the_rig_file_tells(sound: Simulated, tmp_path: Path) -> None:
